@@ -7,7 +7,6 @@ than the rest of the way.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.force_at_a_time import LAST_FALLS, LEAST_WAY_M
@@ -21,10 +20,10 @@ EDGE_S = 0.02
 class FrictionFromATime(Form):
     """Another coefficient of object 1 from one moment of each trial on."""
 
-    name: ClassVar[str] = "friction_from_a_time"
-    meaning: ClassVar[str] = "friction of object 1 that changes at one moment"
-    family: ClassVar[str] = "step_t"
-    is_on_all: ClassVar[bool] = False
+    name = "friction_from_a_time"
+    meaning = "friction of object 1 that changes at one moment"
+    family = "step_t"
+    is_on_all = False
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By how much, and when; none in a fall."""

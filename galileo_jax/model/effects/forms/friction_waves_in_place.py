@@ -6,7 +6,6 @@ A = friction_waves_in_place, B = friction_waves_in_place_later, q along the path
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
@@ -20,9 +19,9 @@ LENGTH_PRIOR = LogNormal(median=0.2, sd=0.7)
 class FrictionWavesInPlace(Form):
     """Coefficients of all objects that wave along the path."""
 
-    name: ClassVar[str] = "friction_waves_in_place"
-    meaning: ClassVar[str] = "friction that goes up and down along the path"
-    family: ClassVar[str] = "wave_q"
+    name = "friction_waves_in_place"
+    meaning = "friction that goes up and down along the path"
+    family = "wave_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a wave apart, and its length; none in a fall."""

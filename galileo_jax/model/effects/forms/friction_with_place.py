@@ -3,8 +3,6 @@
 k(q) = max(0, k (1 + friction_with_place q))    for every object, q along the path
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
 from galileo_jax.model.parameters import Normal, Parameter
@@ -15,9 +13,9 @@ PRIOR = Normal(0.0, 1.0)
 class FrictionWithPlace(Form):
     """Coefficients of all objects that change along the path."""
 
-    name: ClassVar[str] = "friction_with_place"
-    meaning: ClassVar[str] = "friction that grows or falls along the path"
-    family: ClassVar[str] = "linear_q"
+    name = "friction_with_place"
+    meaning = "friction that grows or falls along the path"
+    family = "linear_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per metre; none in a fall."""

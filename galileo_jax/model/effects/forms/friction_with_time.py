@@ -3,8 +3,6 @@
 k(t) = max(0, k (1 + friction_with_time t))    for every object, t since the release
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
 from galileo_jax.model.parameters import Normal, Parameter
@@ -15,9 +13,9 @@ PRIOR = Normal(0.0, 1.0)
 class FrictionWithTime(Form):
     """Coefficients of all objects that change with time."""
 
-    name: ClassVar[str] = "friction_with_time"
-    meaning: ClassVar[str] = "friction that grows or falls with time"
-    family: ClassVar[str] = "power_t"
+    name = "friction_with_time"
+    meaning = "friction that grows or falls with time"
+    family = "power_t"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per second; none in a fall."""

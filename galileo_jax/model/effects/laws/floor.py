@@ -9,8 +9,6 @@ Source: Newton, Principia, laws of motion, scholium (1687); Cross (2002), Grip-s
 a bouncing ball, Am. J. Phys. 70, 1093.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter, Uniform
 
@@ -20,7 +18,7 @@ MOST_GRIP = 0.6  # a ball that stops slipping keeps 5/7 of its speed or so
 class Floor(Effect):
     """A level floor."""
 
-    name: ClassVar[str] = "floor"
+    name = "floor"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Restitution and grip, and how high a centre is at the impact (as measured)."""

@@ -14,7 +14,6 @@ Fluid Dynamics (1967), sections 5.11 and 6.8.
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -27,7 +26,7 @@ DRAG_PRIOR = LogNormal(median=0.1, sd=1.5)
 class Liquid(Effect):
     """What a liquid does to a body in it."""
 
-    name: ClassVar[str] = "liquid"
+    name = "liquid"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The ratio of the densities and the drag constant c."""

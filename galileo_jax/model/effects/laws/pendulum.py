@@ -14,7 +14,6 @@ Source: Huygens, Horologium oscillatorium (1673); Baker and Blackburn, The Pendu
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
@@ -25,7 +24,7 @@ LENGTH, ANGLE = "thread_length", "start_angle"
 class Pendulum(Effect):
     """A bob on a thread or a rod."""
 
-    name: ClassVar[str] = PENDULUM
+    name = PENDULUM
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The length, and each clip's angle at the start."""

@@ -21,7 +21,6 @@ Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase f
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter, Role, Uniform
@@ -35,7 +34,7 @@ START = ("start_velocity_x", "start_velocity_y", "start_turning")
 class Pucks(Effect):
     """Start velocities, the rims' restitution and grip, and where exactly they meet."""
 
-    name: ClassVar[str] = "pucks"
+    name = "pucks"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Of what moves when it is first seen its velocities; of several pucks what a hit does."""

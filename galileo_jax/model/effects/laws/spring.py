@@ -13,7 +13,6 @@ Source: Hooke, De potentia restitutiva (1678); Taylor, Classical Mechanics (2005
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
@@ -24,7 +23,7 @@ DAMPING_PRIOR = LogNormal(median=0.1, sd=1.5)
 class Spring(Effect):
     """A hanging spring."""
 
-    name: ClassVar[str] = "spring"
+    name = "spring"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Period without damping, damping, and where the object would hang at rest."""

@@ -13,7 +13,6 @@ A throw, a swing that is under way, a body that was let go before the clip begin
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
@@ -27,7 +26,7 @@ LAUNCH = "launch_angle"
 class StartVelocity(Effect):
     """The velocity in the first frame; each clip has its own."""
 
-    name: ClassVar[str] = "start_velocity"
+    name = "start_velocity"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Its components in the plane (and a launcher's angle), or the speed along the path."""

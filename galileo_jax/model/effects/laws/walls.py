@@ -13,8 +13,6 @@ Source: Newton, Principia, laws of motion, scholium (1687); Walton (1993), in: P
 flow (the impulse along the wall).
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta, Walls
 from galileo_jax.model.parameters import Normal, Parameter, Uniform
 
@@ -25,7 +23,7 @@ ENDS = ("from", "to")
 class StraightWalls(Effect):
     """All declared walls: one restitution, one grip, and where exactly each of them is."""
 
-    name: ClassVar[str] = "walls"
+    name = "walls"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Restitution and grip of all walls; of each how far either end is off, to its left."""

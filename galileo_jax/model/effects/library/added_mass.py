@@ -14,8 +14,6 @@ Introduction to Fluid Dynamics (1967), section 6.8.
 Confused with: scale_error, frame_rate: each of them acts like another gravity; rod_mass.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.air import undeclared_odds
 from galileo_jax.model.effects.effect import (
     PENDULUM,
@@ -42,7 +40,7 @@ LIFT = 2.0  # what is displaced over what a sphere carries along
 class AddedMass(Effect):
     """Fluid that the object carries along and displaces."""
 
-    name: ClassVar[str] = "added_mass"
+    name = "added_mass"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The fluid's share; none on a surface or a spring, whose masses do not show."""

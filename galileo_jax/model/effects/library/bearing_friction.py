@@ -9,8 +9,6 @@ Source: Squire (1986), Pendulum damping, Am. J. Phys. 54, 984.
 Confused with: viscous_drag in a clip of a few swings of nearly the same size.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     PENDULUM,
     Array,
@@ -30,7 +28,7 @@ PRIOR = LogNormal(median=0.005, sd=1.0)
 class BearingFriction(Effect):
     """Dry friction in a pendulum's bearing."""
 
-    name: ClassVar[str] = "bearing_friction"
+    name = "bearing_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient k; none but for a pendulum."""

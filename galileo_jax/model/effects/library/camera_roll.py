@@ -9,7 +9,6 @@ in the picture tells; `vertical_sd_deg` allows for it in every model.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -22,7 +21,7 @@ PRIOR = Normal(0.0, math.radians(2.0))
 class CameraRoll(Effect):
     """The camera was rolled about its line of sight."""
 
-    name: ClassVar[str] = "camera_roll"
+    name = "camera_roll"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The roll; none but in the plane of a picture whose vertical is taken at its word."""

@@ -11,8 +11,6 @@ Confused with: surface_friction where the strip begins at the foot and is long;
 magnetic_brake where the speed hardly changes inside.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.effects.zone import share_inside, zone_parameters
@@ -25,7 +23,7 @@ PRIOR = Normal(0.0, 0.2)
 class FrictionPatch(Effect):
     """A strip of the way with another friction coefficient."""
 
-    name: ClassVar[str] = "friction_patch"
+    name = "friction_patch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher it is there, and the zone; none in a fall."""

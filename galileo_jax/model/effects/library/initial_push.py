@@ -9,8 +9,6 @@ Confused with: a release before the first frame (release_instant), where the fir
 are missing.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -22,7 +20,7 @@ PRIOR = LogNormal(median=0.3, sd=1.0)
 class InitialPush(Effect):
     """Object 1 is pushed at the release."""
 
-    name: ClassVar[str] = "initial_push"
+    name = "initial_push"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The speed; none of what moves already when it is first seen."""

@@ -11,8 +11,6 @@ Confused with: friction_patch where the speed hardly changes inside; viscous_dra
 zone is the whole path.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.effects.zone import share_inside, zone_parameters
@@ -25,7 +23,7 @@ PRIOR = LogNormal(median=1.0, sd=1.2)
 class MagneticBrake(Effect):
     """A zone in which object 1 is braked in proportion to its speed."""
 
-    name: ClassVar[str] = "magnetic_brake"
+    name = "magnetic_brake"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant b, and the zone; none in a fall."""

@@ -16,7 +16,6 @@ steady backspin lifts almost evenly.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.effect import SPIN, Array, Effect, Push, Surroundings, Theta
@@ -33,7 +32,7 @@ SLOW_M_S, LEAST_RAD_S = 1e-3, 1e-3  # at rest S has no value, and without spin n
 class Magnus(Effect):
     """Lift on a spinning ball in flight."""
 
-    name: ClassVar[str] = "magnus"
+    name = "magnus"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The spin, known or not, and the lift per spin; none but in a flight."""

@@ -13,8 +13,6 @@ Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. 
 Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -26,7 +24,7 @@ PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
 class OvalRim(Effect):
     """How far from round pucks are that are seen from above."""
 
-    name: ClassVar[str] = "oval_rim"
+    name = "oval_rim"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two of every puck; none of what is not seen from above, or has nothing to meet."""

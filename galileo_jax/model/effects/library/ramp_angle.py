@@ -10,7 +10,6 @@ The direction of travel in the picture and friction on the table tell them apart
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -23,7 +22,7 @@ PRIOR = Normal(0.0, math.radians(2.0))
 class RampAngle(Effect):
     """The declared angle of the ramp is wrong."""
 
-    name: ClassVar[str] = "ramp_angle"
+    name = "ramp_angle"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much steeper the ramp is; none where nothing is on it, or in a fall."""

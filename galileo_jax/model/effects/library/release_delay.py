@@ -10,8 +10,6 @@ Source: kinematics; Brown and Cox (2009), Innovative uses of video analysis, Phy
 Confused with: static_friction (a late start); initial_push of the opposite sign.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -23,7 +21,7 @@ PRIOR = LogNormal(median=0.15, sd=1.0)
 class ReleaseDelay(Effect):
     """Object 1 is released later than in the first frame."""
 
-    name: ClassVar[str] = "release_delay"
+    name = "release_delay"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The delay; no rollout depends on it. None where nothing is let go."""

@@ -9,8 +9,6 @@ Source: Newton, Principia, laws of motion, scholium (1687); Stronge, Impact Mech
 Confused with: the mass ratio, where only object 2 is seen after the hit.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Parameter, Uniform
@@ -20,7 +18,7 @@ from galileo_jax.model.parameters import Parameter, Uniform
 class Restitution(Effect):
     """Objects bounce when they collide."""
 
-    name: ClassVar[str] = "restitution"
+    name = "restitution"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient e; none where there is nothing to hit."""

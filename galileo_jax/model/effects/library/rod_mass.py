@@ -8,8 +8,6 @@ Source: Taylor, Classical Mechanics (2005), section 10.2 (a rod about its end: M
 Confused with: scale_error, frame_rate: each of them acts like another gravity.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     PENDULUM,
     Array,
@@ -30,7 +28,7 @@ PRIOR = LogNormal(median=0.3, sd=0.7)
 class RodMass(Effect):
     """The rod of a pendulum has a mass."""
 
-    name: ClassVar[str] = "rod_mass"
+    name = "rod_mass"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The ratio of the masses; none but for a pendulum."""

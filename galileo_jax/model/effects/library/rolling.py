@@ -13,8 +13,6 @@ Confused with: scale_error, frame_rate and a larger k on one slope; the table te
 the impact the mass.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -27,7 +25,7 @@ ON_WHEELS = 0.05  # odds that a box has some: a toy car, a cart
 class Rolling(Effect):
     """Object 1 rolls instead of sliding."""
 
-    name: ClassVar[str] = "rolling"
+    name = "rolling"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The share beta; none in a fall, and none where object 1 is declared to roll."""

@@ -11,8 +11,6 @@ Confused with: frame_rate (both act like another gravity, g (1 + s) against g (1
 rolling; on one slope k1 and ramp_angle.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.effects.scaled import scaled, unscaled
@@ -25,7 +23,7 @@ PRIOR = Normal(0.0, 0.07)
 class ScaleError(Effect):
     """The declared scale is wrong."""
 
-    name: ClassVar[str] = "scale_error"
+    name = "scale_error"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error s; none where the scale is itself unknown (pixel_scale)."""

@@ -19,7 +19,6 @@ left, g cos a (tan a - k - s):
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -35,7 +34,7 @@ LEAST_SHARE = 1e-3
 class StaticFriction(Effect):
     """Friction is larger at rest than in motion."""
 
-    name: ClassVar[str] = "static_friction"
+    name = "static_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The extra coefficient s; none in a fall."""

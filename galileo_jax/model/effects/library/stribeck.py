@@ -11,8 +11,6 @@ Confused with: a larger k where v_s is above all speeds; static_friction where i
 below them; constant_force and air_drag in part (they change the acceleration with speed too).
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -25,7 +23,7 @@ SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
 class Stribeck(Effect):
     """Friction falls with the speed."""
 
-    name: ClassVar[str] = "stribeck"
+    name = "stribeck"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much more friction there is at low speed, and up to which; none in a fall."""

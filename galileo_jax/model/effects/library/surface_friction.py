@@ -6,8 +6,6 @@ Source: Amontons (1699); Coulomb (1785): the coefficient belongs to the pair of 
 Confused with: table_tilt; friction_patch from the foot on; in part constant_force.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -19,7 +17,7 @@ PRIOR = Normal(0.0, 0.1)
 class SurfaceFriction(Effect):
     """Object 1 has another friction coefficient on the table."""
 
-    name: ClassVar[str] = "surface_friction"
+    name = "surface_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher the table is; none without a table."""

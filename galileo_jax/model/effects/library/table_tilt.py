@@ -12,7 +12,6 @@ frictions on the table, where both objects move: only the direction in the pictu
 
 import math
 from dataclasses import replace
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -25,7 +24,7 @@ PRIOR = Normal(0.0, math.radians(1.5))
 class TableTilt(Effect):
     """The table is not level."""
 
-    name: ClassVar[str] = "table_tilt"
+    name = "table_tilt"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The table's slope, from above both; none without a table."""

@@ -9,8 +9,6 @@ Source: Hooke, De potentia restitutiva (1678); Landau and Lifshitz, Mechanics (1
 Confused with: a longer thread where swings are small and nobody declared its length.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -22,7 +20,7 @@ PRIOR = LogNormal(median=0.01, sd=0.7)
 class ThreadStretch(Effect):
     """The thread of a pendulum stretches."""
 
-    name: ClassVar[str] = "thread_stretch"
+    name = "thread_stretch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The stretch by the weight; none but for a pendulum."""

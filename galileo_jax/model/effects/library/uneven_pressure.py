@@ -16,8 +16,6 @@ Robotics Res. 15, 557 (a limit surface about the centre of pressure).
 Confused with: nothing where the turning is in the data; else hardly seen at all.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -29,7 +27,7 @@ PRIOR = Normal(0.0, 0.15)  # of a radius: a felt or a burr on one side
 class UnevenPressure(Effect):
     """Where pucks that are seen from above press on the table."""
 
-    name: ClassVar[str] = "uneven_pressure"
+    name = "uneven_pressure"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two of every puck; none of what is not seen from above."""

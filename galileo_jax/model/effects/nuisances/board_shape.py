@@ -13,7 +13,7 @@ speed, -v^2 d'(q); the path in the picture is bent alike:
 Only where the path is clearly bent (`scene/board_path.py`), which gives the prior.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 from numpy.polynomial import legendre
 
@@ -30,7 +30,7 @@ NODES, WEIGHTS = legendre.leggauss(8)  # exact for polynomials of degree 15
 class BoardShape(Effect):
     """The slope's changes along the way, in each clip on its own."""
 
-    name: ClassVar[str] = "board_slope"
+    name = "board_slope"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The c_n, rad; none where the path is straight."""

@@ -1,7 +1,5 @@
 """Contact gap: bodies that touch a second time do so further apart than when they met."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import HalfNormal, Parameter
 
@@ -19,7 +17,7 @@ class ContactGap(Effect):
     coefficients of friction.
     """
 
-    name: ClassVar[str] = "contact_gap"
+    name = "contact_gap"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much further, m; none where there is nothing to hit."""

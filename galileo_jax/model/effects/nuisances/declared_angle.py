@@ -1,7 +1,5 @@
 """Declared angle: read off a picture or a protractor, it is known to so and so many tenths."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
@@ -14,7 +12,7 @@ class DeclaredAngle(Effect):
     picture's vertical (`vertical_sd_deg`).
     """
 
-    name: ClassVar[str] = ANGLE
+    name = ANGLE
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much steeper, rad; none where the angle is taken at its word."""

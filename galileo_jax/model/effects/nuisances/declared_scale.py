@@ -1,7 +1,5 @@
 """Declared scale: read off a picture, it is as good as the two pixels it was read from."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.scaled import scaled, unscaled
 from galileo_jax.model.parameters import Normal, Parameter
@@ -13,7 +11,7 @@ class DeclaredScale(Effect):
     As the effect `scale_error`, which is for scales that are wrong by more than anybody said.
     """
 
-    name: ClassVar[str] = "declared_scale"
+    name = "declared_scale"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error s; none where the scale is taken at its word, or unknown."""

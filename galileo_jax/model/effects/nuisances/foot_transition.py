@@ -1,7 +1,5 @@
 """Foot transition: how much speed a real edge keeps at the foot of the ramp."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
@@ -17,7 +15,7 @@ class FootTransition(Effect):
     MuJoCo and Bullet keep 1 to 4 % less, depending on angle and size, and so does a real edge.
     """
 
-    name: ClassVar[str] = "foot_transition"
+    name = "foot_transition"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The factor on the speed."""

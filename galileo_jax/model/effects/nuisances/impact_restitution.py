@@ -1,7 +1,5 @@
 """Impact restitution: no real impact is perfectly plastic."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import HalfNormal, Parameter
 
@@ -17,7 +15,7 @@ class ImpactRestitution(Effect):
     of friction or mass.
     """
 
-    name: ClassVar[str] = "impact_restitution"
+    name = "impact_restitution"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient; none where there is nothing to hit."""

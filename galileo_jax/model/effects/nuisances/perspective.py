@@ -1,7 +1,5 @@
 """Perspective: who films a high fall from the ground looks up, and the scale changes on the way."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import FALL_LENGTH, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
@@ -20,7 +18,7 @@ class Perspective(Effect):
     seen by a tilted camera).
     """
 
-    name: ClassVar[str] = "perspective"
+    name = "perspective"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much the scale changes; none where a fall is low enough for a level camera."""

@@ -1,7 +1,5 @@
 """Pixel scale: how many pixels a metre is, where nobody declared it."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Parameter
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
@@ -14,7 +12,7 @@ class PixelScale(Effect):
     scale * (sin a - k cos a) shows, and neither it nor k can be determined.
     """
 
-    name: ClassVar[str] = "pixel_scale"
+    name = "pixel_scale"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The scale, px/m; none where it is declared, or lengths are in radii of a puck."""

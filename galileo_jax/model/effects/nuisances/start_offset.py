@@ -1,7 +1,5 @@
 """Start offset: each object starts a few millimetres from where it was marked."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import ORIGIN, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
@@ -15,7 +13,7 @@ class StartOffset(Effect):
     foot that is known no better than `origin_sd_px` shifts all of them.
     """
 
-    name: ClassVar[str] = "start_offset"
+    name = "start_offset"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """One per object, m."""

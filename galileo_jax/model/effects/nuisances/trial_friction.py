@@ -10,8 +10,6 @@ Source: four runs of one block on one board (docs/explanation/real_data.md); Gel
 Data Analysis Using Regression and Multilevel/Hierarchical Models, ch. 12.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 
@@ -21,8 +19,8 @@ SPREAD, SPREAD_FACTOR = 0.03, 1.386  # median, and the standard deviation of its
 class TrialFriction(Effect):
     """A factor on the friction of each object, of each trial another."""
 
-    name: ClassVar[str] = "trial_friction"
-    spread: ClassVar[str] = "friction_spread"
+    name = "trial_friction"
+    spread = "friction_spread"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The spread, which trials share, and each object's deviation; none without a surface."""
