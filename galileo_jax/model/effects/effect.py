@@ -10,6 +10,7 @@ the plane of the picture. Hooks see and return numbers along it, positive downhi
 the ramp; in the plane, along the velocity.
 """
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
@@ -248,6 +249,9 @@ class Surroundings:
         return value[..., None] * value.__array_namespace__().asarray(chosen)
 
 
+Place = Callable[[Surroundings], bool]
+
+
 class Effect:
     """One physical (or measurement) effect.
 
@@ -258,6 +262,13 @@ class Effect:
     """
 
     name: ClassVar[str]
+
+    def __init_subclass__(cls, where: Place | None = None) -> None:
+        """`where` tells in which scenes the effect has a place; in others its hooks do nothing."""
+        super().__init_subclass__()
+        if where is not None:
+            for hook in set(vars(cls)) & HOOKS:
+                setattr(cls, hook, _in_place(where, vars(cls)[hook], getattr(Effect, hook)))
 
     def __eq__(self, other: object) -> bool:
         """Whether the other does the same, also to a compiled program."""
@@ -276,7 +287,7 @@ class Effect:
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The unknowns it brings, the strength first; empty where it has no place."""
-        raise NotImplementedError
+        return ()
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """How many times as likely as its prior says it is to be there, at these values.
@@ -400,6 +411,19 @@ class Effect:
     ) -> Float[AnyArray, "object axis frame"]:
         """Maps true centres to measured ones, `[object, axis, frame]`, m (scale, camera)."""
         return position_m
+
+
+HOOKS = {name for name in vars(Effect) if not name.startswith("_")} - {"identity", "name"}
+
+
+def _in_place(where: Place, own: Any, absent: Any) -> Any:
+    """The hook `own` of an effect; `absent` in a scene, the last argument, without a place."""
+
+    @functools.wraps(own)
+    def hook(self: Effect, *arguments: Any) -> Any:
+        return (own if where(arguments[-1]) else absent)(self, *arguments)
+
+    return hook
 
 
 def true_surroundings(effects: Sequence[Effect], theta: Theta, scene: Surroundings) -> Surroundings:

@@ -10,7 +10,7 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, 1.0)
 
 
-class FrictionWithPlace(Form):
+class FrictionWithPlace(Form, where=lambda scene: scene.has_surface):
     """Coefficients of all objects that change along the path."""
 
     name = "friction_with_place"
@@ -19,14 +19,10 @@ class FrictionWithPlace(Form):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per metre; none in a fall."""
-        if not scene.has_surface:
-            return ()
         return (Parameter(self.name, "1/m", PRIOR, 0.0, "effect", 0.1),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not scene.has_surface:
-            return None
         share = theta[self.name][..., None]
 
         def law(state: State, k: Array) -> Array:

@@ -26,6 +26,6 @@ class Gravity(Effect):
         prior = LogNormal(scene.gravity, PRIOR_SD)
         return (Parameter("gravity", "m/s^2", prior, scene.gravity, "main", 0.05),)
 
-    def gravity(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def gravity(self, theta: Theta, scene: Surroundings) -> Array:
         """As inferred."""
         return theta["gravity"]

@@ -20,22 +20,18 @@ PRIOR = Normal(0.0, 0.2)
 
 
 @register
-class FrictionPatch(Effect):
+class FrictionPatch(Effect, where=lambda scene: scene.has_surface):
     """A strip of the way with another friction coefficient."""
 
     name = "friction_patch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher it is there, and the zone; none in a fall."""
-        if not scene.has_surface:
-            return ()
         strength = Parameter("friction_patch", "1", PRIOR, 0.0, "effect", 0.05)
         return (strength, *zone_parameters(self.name, scene))
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not scene.has_surface:
-            return None
         rougher = theta["friction_patch"]
         rougher = scene.only(rougher, 0) if scene.is_level else rougher[..., None]
 

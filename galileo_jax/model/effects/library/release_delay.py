@@ -18,17 +18,15 @@ PRIOR = LogNormal(median=0.15, sd=1.0)
 
 
 @register
-class ReleaseDelay(Effect):
+class ReleaseDelay(Effect, where=lambda scene: not scene.starts_moving):
     """Object 1 is released later than in the first frame."""
 
     name = "release_delay"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The delay; no rollout depends on it. None where nothing is let go."""
-        if scene.starts_moving:
-            return ()
         return (Parameter("release_delay", "s", PRIOR, 0.0, "effect", step=None, per_clip=True),)
 
     def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
         """The time since the true release."""
-        return time_s if scene.starts_moving else time_s - theta["release_delay"]
+        return time_s - theta["release_delay"]

@@ -20,25 +20,19 @@ PRIOR = Normal(0.0, 0.07)
 
 
 @register
-class ScaleError(Effect):
+class ScaleError(Effect, where=lambda scene: scene.is_scale_known):
     """The declared scale is wrong."""
 
     name = "scale_error"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error s; none where the scale is itself unknown (pixel_scale)."""
-        if not scene.is_scale_known:
-            return ()
         return (Parameter("scale_error", "1", PRIOR, 0.0, "effect", 0.05),)
 
     def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The true starts."""
-        if not self.parameters(scene):
-            return path_m
         return unscaled(path_m, theta["scale_error"])
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres as the declared scale shows them."""
-        if not self.parameters(scene):
-            return position_m
         return scaled(position_m, theta["scale_error"], scene)

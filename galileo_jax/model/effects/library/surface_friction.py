@@ -14,21 +14,17 @@ PRIOR = Normal(0.0, 0.1)
 
 
 @register
-class SurfaceFriction(Effect):
+class SurfaceFriction(Effect, where=lambda scene: scene.has_table):
     """Object 1 has another friction coefficient on the table."""
 
     name = "surface_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher the table is; none without a table."""
-        if not scene.has_table:
-            return ()
         return (Parameter("surface_friction", "1", PRIOR, 0.0, "effect", 0.05),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not self.parameters(scene):
-            return None
         rougher = scene.only(theta["surface_friction"], 0)
 
         def law(state: State, k: Array) -> Array:

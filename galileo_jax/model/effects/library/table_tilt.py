@@ -21,7 +21,7 @@ PRIOR = Normal(0.0, math.radians(1.5))
 
 
 @register
-class TableTilt(Effect):
+class TableTilt(Effect, where=lambda scene: scene.has_table or scene.is_level):
     """The table is not level."""
 
     name = "table_tilt"
@@ -31,12 +31,10 @@ class TableTilt(Effect):
         tilt = Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05)
         if scene.is_level:
             return (tilt, replace(tilt, name="table_tilt_y"))
-        return (tilt,) if scene.has_table else ()
+        return (tilt,)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
         """Of the table alone."""
-        if not self.parameters(scene):
-            return None
         slope = theta["table_tilt"]
         if scene.is_level:
             return slope, theta["table_tilt_y"]

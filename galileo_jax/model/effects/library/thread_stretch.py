@@ -17,17 +17,15 @@ PRIOR = LogNormal(median=0.01, sd=0.7)
 
 
 @register
-class ThreadStretch(Effect):
+class ThreadStretch(Effect, where=lambda scene: PENDULUM in scene.laws):
     """The thread of a pendulum stretches."""
 
     name = "thread_stretch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The stretch by the weight; none but for a pendulum."""
-        if PENDULUM not in scene.laws:
-            return ()
         return (Parameter("thread_stretch", "m", PRIOR, 0.0, "effect", 0.1),)
 
-    def stretch(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def stretch(self, theta: Theta, scene: Surroundings) -> Array:
         """How far."""
-        return theta["thread_stretch"] if PENDULUM in scene.laws else None
+        return theta["thread_stretch"]

@@ -27,7 +27,7 @@ MOST = 5  # of n
 NODES, WEIGHTS = legendre.leggauss(8)  # exact for polynomials of degree 15
 
 
-class BoardShape(Effect):
+class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
     """The slope's changes along the way, in each clip on its own."""
 
     name = "board_slope"
@@ -41,10 +41,8 @@ class BoardShape(Effect):
             if name in scene.expected
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """What the true slope adds to the pull down the mean one."""
-        if LENGTH not in scene.expected:
-            return None
         mass = scene.mass(theta)
         xp = mass[0].__array_namespace__()
         weight = xp.stack(mass, axis=-1) * xp.asarray(scene.gravity)[..., None]
@@ -56,10 +54,8 @@ class BoardShape(Effect):
 
         return pull
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """Coefficients as they act on a force across the board of m g cos(mean angle)."""
-        if LENGTH not in scene.expected:
-            return None
 
         def law(state: State, k: Array) -> Array:
             xp = k.__array_namespace__()
@@ -72,8 +68,6 @@ class BoardShape(Effect):
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres on the bent path, where the engine has them on a straight one."""
-        if LENGTH not in scene.expected:
-            return position_m
         xp = position_m.__array_namespace__()
         start = xp.asarray(scene.start_m)[:, :, None]
         angle = xp.asarray(scene.angle_rad)

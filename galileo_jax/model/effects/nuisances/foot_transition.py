@@ -6,7 +6,7 @@ from galileo_jax.model.parameters import Normal, Parameter
 SD = 0.05
 
 
-class FootTransition(Effect):
+class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.comes_down)):
     """A factor on the speed where the path bends.
 
         v+ = f v- max(0, cos a - k sin a)
@@ -19,10 +19,8 @@ class FootTransition(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The factor on the speed."""
-        if not (scene.has_table and any(scene.comes_down)):
-            return ()
         return (Parameter("foot_transition", "1", Normal(1.0, SD), 1.0, "nuisance", 0.1),)
 
-    def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def foot(self, theta: Theta, scene: Surroundings) -> Array:
         """The factor."""
-        return theta["foot_transition"] if self.parameters(scene) else None
+        return theta["foot_transition"]

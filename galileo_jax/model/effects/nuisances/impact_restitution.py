@@ -8,7 +8,7 @@ from galileo_jax.model.parameters import HalfNormal, Parameter
 PRIOR = HalfNormal(0.04)
 
 
-class ImpactRestitution(Effect):
+class ImpactRestitution(Effect, where=lambda scene: len(scene.names) > 1 and not scene.is_level):
     """A small coefficient of restitution between the objects.
 
     Without it a rebound of a few per cent, which every body shows, is taken for a difference
@@ -19,10 +19,8 @@ class ImpactRestitution(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient; none where there is nothing to hit."""
-        if len(scene.names) < 2 or scene.is_level:
-            return ()
         return (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 
-    def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def restitution(self, theta: Theta, scene: Surroundings) -> Array:
         """The coefficient of restitution."""
-        return theta["impact_restitution"] if self.parameters(scene) else None
+        return theta["impact_restitution"]

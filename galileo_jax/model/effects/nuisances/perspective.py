@@ -4,7 +4,7 @@ from galileo_jax.model.effects.effect import FALL_LENGTH, Array, Effect, Surroun
 from galileo_jax.model.parameters import Normal, Parameter
 
 
-class Perspective(Effect):
+class Perspective(Effect, where=lambda scene: "perspective" in scene.expected):
     """The picture grows along a fall by `exp(-p)` at its top to `exp(p)` at its end.
 
         seen = h w / (w + (1 - w) exp(p)),    w = fallen / h
@@ -22,15 +22,11 @@ class Perspective(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much the scale changes; none where a fall is low enough for a level camera."""
-        if self.name not in scene.expected:
-            return ()
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "1", prior, 0.0, "nuisance", step=None),)
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres as the pitched camera shows them."""
-        if not self.parameters(scene):
-            return position_m
         xp = position_m.__array_namespace__()
         length, _ = scene.expected[FALL_LENGTH]
         y = position_m[:, 1]
