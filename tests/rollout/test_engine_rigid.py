@@ -10,7 +10,7 @@ import pytest
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
-from galileo_jax.model.parameters import forward, inverse
+from galileo_jax.model.parameters import PriorTable, inverse
 from galileo_jax.rollout.engine_rigid import EngineRigid, roll_out
 from galileo_jax.rollout.motion import LEAST_FRICTION
 from galileo_jax.rollout.rollout import JUMP_M_S2, at_times
@@ -317,6 +317,8 @@ def test_parameters_outside_jit_and_inside_are_one_path():
     model = make_model(HIT, 0.5)
     z = inverse(model.parameters, jnp.asarray(make_theta(model, HIT)))
     engine = EngineRigid(model)
-    by_call, _ = engine.simulate(np.asarray(forward(model.parameters, jnp.asarray(z)))[None])
+    by_call, _ = engine.simulate(
+        np.asarray(PriorTable.of(model.parameters).forward(jnp.asarray(z)))[None]
+    )
     traced = jax.jit(lambda z: rolled(engine, z).position_m)(z)
     assert np.asarray(traced) == pytest.approx(by_call[0], abs=CLOSED_FORM_ATOL)
