@@ -5,7 +5,6 @@ Written in the array standard, so that the same lines run in NumPy (C engine) an
 
 import dataclasses
 import functools
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -109,10 +108,10 @@ def dynamics(
     start = xp.broadcast_to(xp.asarray(scene.start_path_m), mass.shape)
     for effect in effects:
         start = effect.start(start, theta, scene)
-    share = _sum([e.inertia(theta, scene) for e in effects])
-    speed = _sum([e.start_speed(theta, scene) for e in effects])
-    restitution = _sum([e.restitution(theta, scene) for e in effects])
-    overlap = _sum([e.overlap(theta, scene) for e in effects])
+    share = total([e.inertia(theta, scene) for e in effects])
+    speed = total([e.start_speed(theta, scene) for e in effects])
+    restitution = total([e.restitution(theta, scene) for e in effects])
+    overlap = total([e.overlap(theta, scene) for e in effects])
     tilts = [tilt for e in effects if (tilt := e.tilt(theta, scene)) is not None]
     ramp = scene.angle_rad + xp.zeros(lead)
     table = xp.zeros(lead)
@@ -246,6 +245,7 @@ def pitch(position: OfCentres, scene: Surroundings) -> PerObject:
     return -scene.angle_rad * (1 - share)
 
 
-def _sum(given: Sequence[Array | None]) -> Array | None:
-    terms = [term for term in given if term is not None]
-    return functools.reduce(operator.add, terms) if terms else None
+def total(given: Sequence[Any | None]) -> Any | None:
+    """The sum of what is given; None where nothing is."""
+    terms = [each for each in given if each is not None]
+    return sum(terms[1:], terms[0]) if terms else None

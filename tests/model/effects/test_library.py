@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.effects.effect import State
 from galileo_jax.model.parameters import PriorTable, absent, inverse
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.motion import dynamics, state_at
 from tests.model.effects.motion import (
     INCLINE,
@@ -95,7 +95,7 @@ def engines():
     """Of each scene: without and with the whole library."""
     with in_64_bit():
         return {
-            name: [EngineRigid(model_of(scene, names)) for names in ((), LIBRARY)]
+            name: [EnginePath(model_of(scene, names)) for names in ((), LIBRARY)]
             for name, scene in SCENES.items()
         }
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.events import reaches_s
 from galileo_jax.rollout.motion import Dynamics
-from galileo_jax.rollout.rigid_bodies import (
+from galileo_jax.rollout.path_bodies import (
     Bodies,
     Links,
     Number,
