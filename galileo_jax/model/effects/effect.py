@@ -12,7 +12,7 @@ the ramp; in the plane, along the velocity.
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, NamedTuple
 
 import jax
@@ -97,33 +97,9 @@ Force = Callable[[State], PerObject]
 Push = Callable[[Float[AnyArray, " axis"], Float[AnyArray, ""]], Float[AnyArray, " axis"]]
 Friction = Callable[[State, PerObject], PerObject]
 
-_ARRAYS = (
-    "angle_rad",
-    "gravity",
-    "half_length_m",
-    "half_height_m",
-    "corner_m",
-    "start_m",
-    "start_path_m",
-    "mass_kg",
-    "roll_inertia",
-    "is_box",
-    "release_s",
-    "expected",
-    "walls_m",
-    "half_depth_m",
-    "beside_m",
-)
 _STATIC = (
-    "names",
-    "has_table",
-    "comes_down",
-    "is_scale_known",
-    "is_scale_stated",
-    "has_surface",
-    "rolls",
-    "moves_in_plane",
-    "laws",
+    *("names", "has_table", "comes_down", "is_scale_known", "is_scale_stated"),
+    *("has_surface", "rolls", "moves_in_plane", "laws"),
 )
 
 
@@ -252,6 +228,9 @@ class Surroundings:
 Place = Callable[[Surroundings], bool]
 
 
+_ARRAYS = tuple(one.name for one in fields(Surroundings) if one.name not in _STATIC)
+
+
 class Effect:
     """One physical (or measurement) effect.
 
@@ -266,9 +245,11 @@ class Effect:
     def __init_subclass__(cls, where: Place | None = None) -> None:
         """`where` tells in which scenes the effect has a place; in others its hooks do nothing."""
         super().__init_subclass__()
-        if where is not None:
-            for hook in set(vars(cls)) & HOOKS:
-                setattr(cls, hook, _in_place(where, vars(cls)[hook], getattr(Effect, hook)))
+        if where is None:
+            return
+        for hook in HOOKS:
+            if (own := getattr(cls, hook)) is not (absent := getattr(Effect, hook)):
+                setattr(cls, hook, _in_place(where, own, absent))
 
     def __eq__(self, other: object) -> bool:
         """Whether the other does the same, also to a compiled program."""

@@ -43,9 +43,8 @@ class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """What the true slope adds to the pull down the mean one."""
-        mass = scene.mass(theta)
-        xp = mass[0].__array_namespace__()
-        weight = xp.stack(mass, axis=-1) * xp.asarray(scene.gravity)[..., None]
+        weight = scene.weight(theta)
+        xp = weight.__array_namespace__()
         angle = xp.asarray(scene.angle_rad)
 
         def pull(state: State) -> Array:

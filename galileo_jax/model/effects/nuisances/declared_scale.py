@@ -1,11 +1,11 @@
 """Declared scale: read off a picture, it is as good as the two pixels it was read from."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.scaled import scaled, unscaled
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.scaled import Scaled
 from galileo_jax.model.parameters import Normal, Parameter
 
 
-class DeclaredScale(Effect, where=lambda scene: "declared_scale" in scene.expected):
+class DeclaredScale(Scaled, where=lambda scene: "declared_scale" in scene.expected):
     """Measured lengths are true ones times 1 + s, with s of the size `pixels_per_metre_sd` tells.
 
     As the effect `scale_error`, which is for scales that are wrong by more than anybody said.
@@ -17,11 +17,3 @@ class DeclaredScale(Effect, where=lambda scene: "declared_scale" in scene.expect
         """The relative error s; none where the scale is taken at its word, or unknown."""
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "1", prior, 0.0, "nuisance", 0.1),)
-
-    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The true starts."""
-        return unscaled(path_m, theta[self.name])
-
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres as the declared scale shows them."""
-        return scaled(position_m, theta[self.name], scene)
