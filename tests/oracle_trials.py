@@ -9,7 +9,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.observation.observation import Observation
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from tests.ramp_model import make_model
 from tests.reference_ramp import Experiment, solve
 
@@ -39,5 +39,5 @@ def make_trials(
     for clip, experiment in enumerate(experiments):
         model = replace(make_model(experiment, CLIP_S), effects=effects)
         seen = observe(experiment, seed + 1000 * clip)
-        problems.append(Problem(seen, model, EngineRigid(model), f"clip{clip + 1}"))
+        problems.append(Problem(seen, model, EnginePath(model), f"clip{clip + 1}"))
     return JointProblem(with_shared_parameters(problems))

@@ -8,8 +8,8 @@ ignorance the data have taken away.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+from dataclasses import astuple, dataclass, replace
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,66 +24,114 @@ STRETCHED_TO = 6.0  # z, by a long tail
 Numbers = jax.Array | np.ndarray | np.floating
 
 
-@runtime_checkable
-class Prior(Protocol):
-    """A distribution of one number, as a map from the standard normal."""
+@dataclass(frozen=True)
+class Prior:
+    """A distribution of one number, given by one or two others, as a map from the standard normal.
+
+    Attributes:
+      kind: its row in a `PriorTable`.
+    """
+
+    kind: ClassVar[int]
+
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
+        """The parameter at `z ~ N(0, 1)`: monotonic and differentiable; `xp` is NumPy or JAX."""
+        raise NotImplementedError
 
     def forward(self, z: Numbers) -> Any:
-        """Maps `z ~ N(0, 1)` to the parameter; monotonic and differentiable."""
-        ...
+        """The parameter at `z ~ N(0, 1)`, by JAX."""
+        _, a, b = self.encode()
+        return self.at(z, a, b, jnp)
 
     def inverse(self, theta: Any) -> Any:
-        """Maps the parameter, an array of NumPy or JAX, to `z`."""
-        ...
+        """The `z` of the parameter, an array of NumPy or JAX."""
+        raise NotImplementedError
 
     def encode(self) -> tuple[int, float, float]:
         """Kind and two numbers, as `PriorTable` holds them."""
-        ...
+        a, b, *_ = *astuple(self), 0.0
+        return self.kind, a, b
 
 
 @dataclass(frozen=True)
-class Normal:
+class Normal(Prior):
     """A normal prior."""
 
     mean: float
     sd: float
+    kind = 0
 
-    def forward(self, z: Numbers) -> Any:
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
         """`mean + sd z`."""
-        return self.mean + self.sd * z
+        return a + b * z
 
     def inverse(self, theta: Any) -> Any:
         """`(theta - mean) / sd`."""
         return (theta - self.mean) / self.sd
 
-    def encode(self) -> tuple[int, float, float]:
-        """As `PriorTable` holds it."""
-        return 0, self.mean, self.sd
-
 
 @dataclass(frozen=True)
-class LogNormal:
+class LogNormal(Prior):
     """A positive number known up to a factor of about `exp(sd)`."""
 
     median: float
     sd: float
+    kind = 1
 
-    def forward(self, z: Numbers) -> Any:
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
         """`median exp(sd z)`."""
-        return self.median * jnp.exp(self.sd * z)
+        # A wild proposal's may be infinite: its rollout fails, and it is refused.
+        with np.errstate(over="ignore"):
+            return a * xp.exp(b * z)
 
     def inverse(self, theta: Any) -> Any:
         """`log(theta / median) / sd`; NaN below 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return theta.__array_namespace__().log(theta / self.median) / self.sd
 
-    def encode(self) -> tuple[int, float, float]:
-        """As `PriorTable` holds it."""
-        return 1, self.median, self.sd
+
+@dataclass(frozen=True)
+class Uniform(Prior):
+    """A uniform prior on `[low, high]`."""
+
+    low: float
+    high: float
+    kind = 2
+
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
+        """`low + (high - low) Phi(z)`."""
+        return a + (b - a) * _ndtr(z, xp)
+
+    def inverse(self, theta: Any) -> Any:
+        """`Phi^-1((theta - low) / (high - low))`, finite at the ends."""
+        share = (theta - self.low) / (self.high - self.low)
+        return _ndtri(share.clip(1e-9, 1 - 1e-9))
 
 
 @dataclass(frozen=True)
-class LongTailed:
+class HalfNormal(Prior):
+    """A non-negative number, most likely 0, of the size of `sd` at most."""
+
+    sd: float
+    kind = 3
+
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
+        """`sd Phi^-1((1 + Phi(z)) / 2)`."""
+        return a * _ndtri(0.5 + 0.5 * xp.clip(_ndtr(z, xp), 0.0, 1 - 1e-12))
+
+    def inverse(self, theta: Any) -> Any:
+        """The `z` of `theta`, finite at 0."""
+        xp = theta.__array_namespace__()
+        return _ndtri((2 * _ndtr(theta / self.sd, xp) - 1).clip(1e-9, 1 - 1e-9))
+
+
+@dataclass(frozen=True)
+class LongTailed(Prior):
     """A positive number that is known up to a factor of about `exp(sd)`, unless all is otherwise.
 
     Johnson's S_U of the logarithm: near the median as good as normal, of 2 standard deviations
@@ -94,10 +142,12 @@ class LongTailed:
 
     median: float
     sd: float
+    kind = 4
 
-    def forward(self, z: Numbers) -> Any:
+    @staticmethod
+    def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
         """`median exp(sd sinh(z))`."""
-        return self.median * jnp.exp(self.sd * _stretched(z))
+        return LogNormal.at(_stretched(z), a, b, xp)
 
     def inverse(self, theta: Any) -> Any:
         """`arsinh(log(theta / median) / sd)`; NaN below 0."""
@@ -107,49 +157,8 @@ class LongTailed:
             near = xp.clip(far, -math.sinh(STRETCHED_TO), math.sinh(STRETCHED_TO))
             return xp.asinh(near) + (far - near)
 
-    def encode(self) -> tuple[int, float, float]:
-        """As `PriorTable` holds it."""
-        return 4, self.median, self.sd
 
-
-@dataclass(frozen=True)
-class Uniform:
-    """A uniform prior on `[low, high]`."""
-
-    low: float
-    high: float
-
-    def forward(self, z: Numbers) -> Any:
-        """`low + (high - low) Phi(z)`."""
-        return self.low + (self.high - self.low) * ndtr(z)
-
-    def inverse(self, theta: Any) -> Any:
-        """`Phi^-1((theta - low) / (high - low))`, finite at the ends."""
-        share = (theta - self.low) / (self.high - self.low)
-        return _ndtri(share.clip(1e-9, 1 - 1e-9))
-
-    def encode(self) -> tuple[int, float, float]:
-        """As `PriorTable` holds it."""
-        return 2, self.low, self.high
-
-
-@dataclass(frozen=True)
-class HalfNormal:
-    """A non-negative number, most likely 0, of the size of `sd` at most."""
-
-    sd: float
-
-    def forward(self, z: Numbers) -> Any:
-        """`sd Phi^-1((1 + Phi(z)) / 2)`."""
-        return self.sd * ndtri(0.5 + 0.5 * jnp.clip(ndtr(z), 0.0, 1 - 1e-12))
-
-    def inverse(self, theta: Any) -> Any:
-        """The `z` of `theta`, finite at 0."""
-        return _ndtri((2 * _ndtr(theta / self.sd) - 1).clip(1e-9, 1 - 1e-9))
-
-    def encode(self) -> tuple[int, float, float]:
-        """As `PriorTable` holds it."""
-        return 3, self.sd, 0.0
+KINDS: tuple[type[Prior], ...] = (Normal, LogNormal, Uniform, HalfNormal, LongTailed)
 
 
 @dataclass(frozen=True)
@@ -194,7 +203,7 @@ class PriorTable(NamedTuple):
     """Priors as numbers: one compiled program then serves clips whose priors differ.
 
     Attributes:
-      kind: `[parameter]`: 0 normal, 1 log-normal, 2 uniform, 3 half-normal, 4 long-tailed.
+      kind: `[parameter]`, places in `KINDS`.
       a, b: `[parameter]`, the prior's numbers in the order of its fields.
     """
 
@@ -225,11 +234,11 @@ class PriorTable(NamedTuple):
     def in_units(self, z: np.ndarray) -> np.ndarray:
         """What `forward` gives, in NumPy: no program to load, no call to dispatch."""
         z = np.asarray(z, float)
-        theta = self.a + self.b * z
-        for kind, of_kind in ((1, _grown), (2, _between), (3, _folded), (4, _far_grown)):
+        theta = np.empty_like(z)
+        for kind, prior in enumerate(KINDS):
             chosen = self.kind == kind
             if chosen.any():
-                theta[..., chosen] = of_kind(z[..., chosen], self.a[chosen], self.b[chosen])
+                theta[..., chosen] = prior.at(z[..., chosen], self.a[chosen], self.b[chosen], np)
         return theta
 
 
@@ -239,34 +248,11 @@ def in_units(prior: Prior, z: Any) -> np.ndarray:
     return PriorTable(kind, a, b).in_units(np.asarray(z, float)[..., None])[..., 0]
 
 
-def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    # A wild proposal's may be infinite: its rollout fails, and it is refused.
-    with np.errstate(over="ignore"):
-        return median * np.exp(sd * z)
-
-
-def _far_grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    return _grown(_stretched(z), median, sd)
-
-
-def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    return low + (high - low) * special.ndtr(z)
-
-
-def _folded(z: np.ndarray, sd: np.ndarray, _: np.ndarray) -> np.ndarray:
-    return sd * special.ndtri(0.5 + 0.5 * np.clip(special.ndtr(z), 0.0, 1 - 1e-12))
-
-
 def _stretched(z: Any) -> Any:
     """The hyperbolic sine; beyond all that is ever likely as slow as z, lest it overflows."""
     xp = z.__array_namespace__()
     near = xp.clip(z, -STRETCHED_TO, STRETCHED_TO)
     return xp.sinh(near) + (z - near)
-
-
-def forward(parameters: Sequence[Parameter], z: jax.Array | np.ndarray) -> jax.Array:
-    """Maps `z` `[..., parameter]` to `theta` of the same shape, in the parameters' units."""
-    return jnp.stack([p.prior.forward(z[..., i]) for i, p in enumerate(parameters)], axis=-1)
 
 
 def inverse(parameters: Sequence[Parameter], theta: Any) -> np.ndarray:
@@ -276,8 +262,8 @@ def inverse(parameters: Sequence[Parameter], theta: Any) -> np.ndarray:
     return np.stack(found, axis=-1)
 
 
-def _ndtr(value: Any) -> Any:
-    return ndtr(value) if isinstance(value, jax.Array) else special.ndtr(value)
+def _ndtr(value: Any, xp: Any) -> Any:
+    return ndtr(value) if xp is jnp else special.ndtr(value)
 
 
 def _ndtri(share: Any) -> Any:

@@ -28,7 +28,7 @@ from galileo_jax.model.effects.nuisances import (
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.neural.film import Bodies, measured, noisy
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
-from galileo_jax.rollout.engine_rigid import roll_out
+from galileo_jax.rollout.engine_path import roll_out
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
 

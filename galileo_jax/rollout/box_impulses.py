@@ -17,7 +17,7 @@ Methods Appl. Mech. Eng. 155, 31.
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -34,6 +34,10 @@ class Speeds(NamedTuple):
 
     velocity: Float[jax.Array, "box 3"]
     spin: Float[jax.Array, "box 3"]
+
+
+Carry = tuple[jax.Array, Speeds, jax.Array]
+"""Impulses, speeds, and the most by which a sweep has changed any."""
 
 
 class Corners(NamedTuple):
@@ -106,32 +110,14 @@ def after_impulses(
 
     def sweep(carry):
         done, _, speeds, standing, between = carry
-        changed = jnp.zeros(())
-        pushes = []
+        changed, pushes = jnp.zeros(()), []
         for of, own, both, impulses in zip(points, pairs, boxes, between, strict=True):
-            at = jnp.asarray(both)
-            num = jnp.sum(of.touches)
-
-            def point(k: jax.Array, carry, own=own, at=at):
-                impulses, speeds, changed = carry
-                each = jax.tree.map(lambda leaf: leaf[k], own)
-                change, speeds = each.swept(impulses[k], speeds, at)
-                most = jnp.maximum(changed, jnp.abs(change) * each.moves[0])
-                return impulses.at[k].add(change), speeds, most
-
-            carry = impulses, speeds, changed
-            impulses, speeds, changed = jax.lax.fori_loop(0, num, point, carry)
+            step, carry = _at_point(own, jnp.asarray(both)), (impulses, speeds, changed)
+            impulses, speeds, changed = jax.lax.fori_loop(0, jnp.sum(of.touches), step, carry)
             pushes.append(impulses)
-
-        def corner(k: jax.Array, carry):
-            standing, speeds, changed = carry
-            each = jax.tree.map(lambda leaf: leaf[:, k], stands)
-            change, speeds = jax.vmap(_Corner.swept)(each, standing[:, k], speeds)
-            most = jnp.maximum(changed, jnp.max(jnp.abs(change)))
-            return standing.at[:, k].add(change), speeds, most
-
         carry = standing, speeds, changed
-        standing, speeds, changed = jax.lax.fori_loop(0, standing.shape[1], corner, carry)
+        step = _at_corner(stands)
+        standing, speeds, changed = jax.lax.fori_loop(0, standing.shape[1], step, carry)
         return done + 1, changed, speeds, standing, tuple(pushes)
 
     def goes_on(carry) -> jax.Array:
@@ -161,6 +147,32 @@ def _ordered(points: Points, order: jax.Array) -> Points:
         points.touches[order],
         points.guess_ns[order],
     )
+
+
+def _at_point(own: "_Point", boxes: jax.Array) -> Callable[[jax.Array, Carry], Carry]:
+    """What a sweep does at point k of two boxes."""
+
+    def step(k: jax.Array, carry: Carry) -> Carry:
+        impulses, speeds, changed = carry
+        each = jax.tree.map(lambda leaf: leaf[k], own)
+        change, speeds = each.swept(impulses[k], speeds, boxes)
+        most = jnp.maximum(changed, jnp.abs(change) * each.moves[0])
+        return impulses.at[k].add(change), speeds, most
+
+    return step
+
+
+def _at_corner(stands: "_Corner") -> Callable[[jax.Array, Carry], Carry]:
+    """What a sweep does at corner k of every box."""
+
+    def step(k: jax.Array, carry: Carry) -> Carry:
+        standing, speeds, changed = carry
+        each = jax.tree.map(lambda leaf: leaf[:, k], stands)
+        change, speeds = jax.vmap(_Corner.swept)(each, standing[:, k], speeds)
+        most = jnp.maximum(changed, jnp.max(jnp.abs(change)))
+        return standing.at[:, k].add(change), speeds, most
+
+    return step
 
 
 class _Corner(NamedTuple):

@@ -13,10 +13,9 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Array
 from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.events import newton, reaches_s
+from galileo_jax.rollout.events import PLASTIC_M_S, newton, reaches_s
 from galileo_jax.rollout.oval_rims import Rim, facing
 
-PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M_S = 1e-9
 NEWTON_STEPS = 3
 CLOSED_M = 1e-7  # rims so near touch

@@ -13,13 +13,12 @@ from jaxtyping import Float
 
 from galileo_jax.rollout.body import Pose, Solid, climbs_m_s, gaps_m, levers_m
 from galileo_jax.rollout.box_impulses import Corners
-from galileo_jax.rollout.events import step_by_events, to_crossing
+from galileo_jax.rollout.events import PLASTIC_M_S, step_by_events, to_crossing
 from galileo_jax.rollout.moreau import Contacts, Masses, least_rises_m_s, stepped, struck
 
 MOST_CONTACTS = 4  # the lowest corners: of a box no more can touch
 MAX_EVENTS = 8  # within one step
 STEP_S = 1 / 592  # four to a frame at 148 Hz
-SLOW_M_S = 0.02  # slower impacts are plastic: nothing rattles for ever
 NEAR_M = 1e-3  # corners so near may come to touch within a step without an impact
 TOUCH_M = 1e-7
 IMPACT_PARTS = 8  # of an impact: friction acts against the slip of its own part
@@ -80,7 +79,7 @@ def _to_impact(
     """
     gaps, climbs = gaps_m(solid, pose), climbs_m_s(solid, pose)
     lowest = jax.lax.top_k(-gaps, MOST_CONTACTS)[1]
-    lasts = ((gaps < NEAR_M) & (climbs > -SLOW_M_S)) | is_last
+    lasts = ((gaps < NEAR_M) & (climbs > -PLASTIC_M_S)) | is_last
 
     def level(at: Pose, _: jax.Array) -> tuple[jax.Array, jax.Array]:
         return gaps_m(solid, at), climbs_m_s(solid, at)
@@ -118,7 +117,7 @@ def _struck(pose: Pose, solid: Solid, hits: jax.Array, lowest: jax.Array) -> Pos
     """The pose after the impact of the corners that `hits` names, and of all that touch."""
     gaps, climbs = gaps_m(solid, pose)[lowest], climbs_m_s(solid, pose)[lowest]
     touches = hits[lowest] | (gaps < TOUCH_M)
-    bounces = jnp.where(climbs < -SLOW_M_S, -solid.restitution * climbs, 0.0)
+    bounces = jnp.where(climbs < -PLASTIC_M_S, -solid.restitution * climbs, 0.0)
     levers = levers_m(solid, pose.quaternion)[lowest]
 
     def part(index: jax.Array, pose: Pose) -> Pose:

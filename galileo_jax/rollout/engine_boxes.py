@@ -6,19 +6,17 @@ all its effects. From the last record before the first hit on each box has six c
 engine is the check: tests/rollout/test_engine_boxes.py.
 """
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.body import Pose
 from galileo_jax.rollout.box_faces import NUM_POINTS
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.engine_rigid import roll_out as roll_out_in_plane
-from galileo_jax.rollout.events import Motion
+from galileo_jax.rollout.engine_path import path_system
+from galileo_jax.rollout.events import Motion, Task, of_task
 from galileo_jax.rollout.free_boxes import (
     MOST_CORNERS,
     Boxes,
@@ -38,33 +36,25 @@ from galileo_jax.rollout.free_start import (
     record_before_hit,
     with_depths,
 )
-from galileo_jax.rollout.motion import Dynamics, dynamics
+from galileo_jax.rollout.motion import Dynamics
 from galileo_jax.runtime.errors import InputError
 
 MEETING_STEPS = 3  # of Newton's method
 
 
-def roll_out(*rollout: Any) -> Motion:
-    """As of `RollOut`; NaN where objects meet while the first still crosses the foot."""
-    poses = roll_out_poses(*rollout)
+@of_task
+def roll_out(task: Task) -> Motion:
+    """Boxes in the plane; NaN where they meet while the first still crosses the foot."""
+    poses = free_poses(task)
     return poses.position_m[:, :2], poses.velocity_m_s[:, :2]
 
 
-def roll_out_poses(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> Poses:
-    """As `roll_out`, in space; the arguments of `RollOut`."""
-    planar = roll_out_in_plane(effects, names, num_records, dt_s, theta, scene, count, acts)
-    named = {name: theta[i] for i, name in enumerate(names)}
-    shapes = _shapes(dynamics(effects, scene, named, jnp, acts), scene)
-    num = jnp.asarray(num_records) if count is None else count
+def free_poses(task: Task) -> Poses:
+    """As `roll_out`, in space."""
+    scene, dt_s = task.scene, task.dt_s
+    planar = task.motion(path_system(task))
+    shapes = _shapes(task.law(), scene)
+    num = jnp.asarray(task.num_records) if task.count is None else task.count
     begin = jnp.minimum(record_before_hit(*planar, scene, dt_s), num - 1)
     before = _flat(planar[0][..., begin], planar[1][..., begin], shapes)
     first, late_s = _to_first_hit(before, begin * dt_s, shapes)

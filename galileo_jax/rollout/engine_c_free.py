@@ -20,7 +20,7 @@ from mujoco.batch import Batch
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.free_scene import free_model
 from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.events import reaches_s
 from galileo_jax.rollout.free_start import (
     Poses,
@@ -60,7 +60,7 @@ class EngineCFree:
         """
         check_free(model)
         self.model = model
-        self._planar = EngineRigid(model)
+        self._planar = EnginePath(model)
         self.substeps = max(1, round(model.record_dt_s / STEP_S))
         self.compiled = free_model(model.scene, model.record_dt_s / self.substeps)
         self._sunk_m = _sunk_m(self.compiled)

@@ -1,5 +1,7 @@
 """The MJX engine: the same rollouts in pure JAX, on a GPU or, slowly, on a CPU."""
 
+import contextlib
+import io
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
@@ -9,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.model import SUBSTEPS, Model
-from galileo_jax.rollout.mjx_import import mjx
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
@@ -19,6 +20,10 @@ from galileo_jax.rollout.mujoco_fields import (
     rigid_motion,
     sliding_object,
 )
+
+# Without the two lines that it prints where NVIDIA Warp is not installed.
+with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+    from mujoco import mjx
 
 # Larger batches are slower per rollout on a CPU; a GPU wants to be filled.
 BATCH_CPU, BATCH_GPU = 8, 256

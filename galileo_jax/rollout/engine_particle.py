@@ -8,19 +8,20 @@ from galileo_jax.model.effects.effect import PENDULUM
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import System, Task, rolled_out
+from galileo_jax.rollout.events import Motion, Task, of_task
 from galileo_jax.rollout.particle_discs import disc_system
 from galileo_jax.rollout.particle_free import free_system
 from galileo_jax.rollout.particle_pendulum import pendulum_system
 from galileo_jax.runtime.errors import InputError
 
 
-@rolled_out
-def roll_out(task: Task) -> System:
+@of_task
+def roll_out(task: Task) -> Motion:
     """What moves in the scene."""
     if task.scene.is_level:
-        return disc_system(task)
-    return pendulum_system(task) if PENDULUM in task.scene.laws else free_system(task)
+        return task.motion(disc_system(task))
+    is_pendulum = PENDULUM in task.scene.laws
+    return task.motion(pendulum_system(task) if is_pendulum else free_system(task))
 
 
 class EngineParticle(EngineJax):

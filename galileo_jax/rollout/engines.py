@@ -29,9 +29,9 @@ def make_engine(name: str, model: Model) -> Engine:
 
         return EngineParticle(model)
     if name == "rigid":
-        from galileo_jax.rollout.engine_rigid import EngineRigid
+        from galileo_jax.rollout.engine_path import EnginePath
 
-        return EngineRigid(model)
+        return EnginePath(model)
     if is_particle:
         raise InputError(f"engine: {name!r} has no scene without a ramp; rigid or auto expected")
     if any(scene.rolls):

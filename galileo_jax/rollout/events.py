@@ -7,7 +7,7 @@ right derivatives, whatever the steps.
 """
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import jax
@@ -25,8 +25,9 @@ Motion = tuple[
 Advance = Callable[[Any, jax.Array, jax.Array, Any], tuple[Any, jax.Array]]
 Part = Callable[[Any, jax.Array], tuple[Any, Any]]
 RollOut = Callable[..., Motion]
-"""See `rolled_out`."""
+"""See `of_task`."""
 
+PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 PART = 16  # records are made in parts of so many, as many parts as are asked for
 NEWTON_STEPS = 8
 
@@ -61,6 +62,8 @@ class Task(NamedTuple):
       scene: as declared.
       dt_s: from record to record.
       acts: `[effect]`, as in `motion.dynamics`.
+      num_records: of which there are places in the result.
+      count: of records that are wanted; beyond, centres are as in the last of these. None: all.
     """
 
     effects: tuple[Effect, ...]
@@ -68,18 +71,24 @@ class Task(NamedTuple):
     scene: Surroundings
     dt_s: float
     acts: jax.Array | None
+    num_records: int
+    count: jax.Array | None
 
     def law(self) -> Dynamics:
         """The equations of motion."""
         return dynamics(self.effects, self.scene, self.named, jnp, self.acts)
 
+    def motion(self, system: System) -> Motion:
+        """What a system does."""
+        states = recorded(system, self.num_records, self.dt_s, self.count)
+        return system.seen(states, self.dt_s * jnp.arange(self.num_records))
 
-def rolled_out(system_of: Callable[[Task], System]) -> RollOut:
-    """The rollout of a system, a function under the name of `system_of`.
 
-    It maps `(effects, names, num_records, dt_s, theta, scene, count=None, acts=None)`, theta
-    `[parameter]`, to centres and velocities. Of records beyond the first `count` the centres are as
-    in the last of these; None: all are wanted.
+def of_task(follows: Callable[[Task], Any]) -> Callable[..., Any]:
+    """What follows from a task, as a function of the task's parts under the name of `follows`.
+
+    It takes `(effects, names, num_records, dt_s, theta, scene, count=None, acts=None)`, theta
+    `[parameter]`.
     """
 
     def roll_out(
@@ -91,14 +100,12 @@ def rolled_out(system_of: Callable[[Task], System]) -> RollOut:
         scene: Surroundings,
         count: jax.Array | None = None,
         acts: jax.Array | None = None,
-    ) -> Motion:
+    ) -> Any:
         named = {name: theta[i] for i, name in enumerate(names)}
-        system = system_of(Task(effects, named, scene, dt_s, acts))
-        states = recorded(system, num_records, dt_s, count)
-        return system.seen(states, dt_s * jnp.arange(num_records))
+        return follows(Task(effects, named, scene, dt_s, acts, num_records, count))
 
     for name in ("__doc__", "__module__", "__name__", "__qualname__"):  # its program's name on disk
-        setattr(roll_out, name, getattr(system_of, name))
+        setattr(roll_out, name, getattr(follows, name))
     return roll_out
 
 
@@ -267,9 +274,3 @@ def to_crossing(
     jumped = jump(after(spent_s), at <= soonest)
     found = jax.tree.map(lambda one, other: jnp.where(any_comes, one, other), jumped, whole)
     return found, spent_s
-
-
-def total(given: Sequence[Any | None]) -> Any | None:
-    """The sum of what is given; None where nothing is."""
-    terms = [each for each in given if each is not None]
-    return sum(terms[1:], terms[0]) if terms else None

@@ -22,7 +22,7 @@ from galileo_jax.model.effects.effect import State, Surroundings
 from galileo_jax.rollout.body import Pose, rotation
 from galileo_jax.rollout.box_faces import Box, Touch, touch
 from galileo_jax.rollout.box_impulses import Corners, Points
-from galileo_jax.rollout.events import reaches_s, step_by_events
+from galileo_jax.rollout.events import PLASTIC_M_S, reaches_s, step_by_events
 from galileo_jax.rollout.moreau import (
     Contacts,
     Masses,
@@ -38,7 +38,6 @@ SUBSTEPS = 3  # of a record: 1/720 s
 MOST_CORNERS = 4  # the lowest: of a box no more can stand
 NEAR_M = 1e-4  # faces so near may come to touch within a step without a hit
 TOUCH_M = 1e-8
-SLOW_M_S = 0.02  # slower hits are plastic: nothing rattles for ever
 REACH_M = 0.01  # points farther apart are of no account in a step
 STILL_M_S = 1e-6
 TINY = 1e-30  # keeps the derivative of a length finite at 0
@@ -114,7 +113,7 @@ def _to_next_hit(
     boxes = after_hits(boxes, time_s, shapes)
     soonest, lasts = left_s, []
     for gap, rate, meets in approaches(boxes.pose, time_s, shapes):
-        last = (gap < NEAR_M) & (rate > -SLOW_M_S)
+        last = (gap < NEAR_M) & (rate > -PLASTIC_M_S)
         soonest = jnp.where(last, soonest, jnp.minimum(soonest, meets))
         lasts.append(last | is_last)
     spent_s = jnp.where(is_last, left_s, soonest)
@@ -185,8 +184,8 @@ def after_hits(boxes: Boxes, time_s: jax.Array, shapes: Shapes) -> Boxes:
     for pair in shapes.pairs:
         near = _touch(pose, pair, shapes)
         opens, is_near = _opening_rate(pose, spin, near, pair), near.gaps_m < TOUCH_M
-        is_hit = jnp.any(is_near & (opens < -SLOW_M_S))
-        least = jnp.where(opens < -SLOW_M_S, -law.restitution * opens, 0.0)
+        is_hit = jnp.any(is_near & (opens < -PLASTIC_M_S))
+        least = jnp.where(opens < -PLASTIC_M_S, -law.restitution * opens, 0.0)
         points.append(_points(pose, near, pair, least, is_near & is_hit, jnp.zeros_like(least)))
         any_hit = any_hit | is_hit
     levers, gaps = _corners(pose, shapes)

@@ -5,7 +5,6 @@ Written in the array standard, so that the same lines run in NumPy (C engine) an
 
 import dataclasses
 import functools
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -98,52 +97,28 @@ def dynamics(
         the same holds for all of a batch. None: all act.
     """
     scene = true_surroundings(effects, theta, scene)
-    count = len(scene.names)
-    mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
+    mass = xp.stack(scene.mass(theta), axis=-1)
+    friction = xp.zeros(mass.shape)
     if scene.has_surface:
-        given = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
-        friction = xp.maximum(given, LEAST_FRICTION)
-    else:
-        friction = xp.zeros(mass.shape)
+        given = [theta[f"k{i + 1}"] for i in range(len(scene.names))]
+        friction = xp.maximum(xp.stack(given, axis=-1), LEAST_FRICTION)
     lead = mass.shape[:-1]
     start = xp.broadcast_to(xp.asarray(scene.start_path_m), mass.shape)
     for effect in effects:
         start = effect.start(start, theta, scene)
-    share = _sum([e.inertia(theta, scene) for e in effects])
-    speed = _sum([e.start_speed(theta, scene) for e in effects])
-    restitution = _sum([e.restitution(theta, scene) for e in effects])
-    overlap = _sum([e.overlap(theta, scene) for e in effects])
-    tilts = [tilt for e in effects if (tilt := e.tilt(theta, scene)) is not None]
-    ramp = scene.angle_rad + xp.zeros(lead)
-    table = xp.zeros(lead)
-    for steeper, sloping in tilts:
-        ramp, table = ramp + steeper, table + sloping
-    foot = xp.ones(lead)
+    share = total([e.inertia(theta, scene) for e in effects])
+    speed = total([e.start_speed(theta, scene) for e in effects])
+    restitution = total([e.restitution(theta, scene) for e in effects])
+    overlap = total([e.overlap(theta, scene) for e in effects])
+    ramp, table, foot = scene.angle_rad + xp.zeros(lead), xp.zeros(lead), xp.ones(lead)
     for effect in effects:
+        if (tilt := effect.tilt(theta, scene)) is not None:
+            ramp, table = ramp + tilt[0], table + tilt[1]
         if (factor := effect.foot(theta, scene)) is not None:
             foot = foot * factor
-    laws = [_if_acts(acts, i, e.friction(theta, scene)) for i, e in enumerate(effects)]
-    laws = [law for law in laws if law is not None]
-    adds = [_if_acts(acts, i, _added(e.force(theta, scene))) for i, e in enumerate(effects)]
-    adds = [add for add in adds if add is not None]
-
-    def coefficient(state: State) -> PerObject:
-        return functools.reduce(lambda k, law: law(state, k), laws, friction)
-
-    # Once for each rollout: its loop has no need of sines.
-    weight = mass * xp.asarray(scene.gravity)[..., None]
-    slopes = ramp[..., None], table[..., None]
-    # In the plane gravity has a direction of its own and is no force along the path.
-    pulls = [weight * (0.0 if scene.moves_in_plane else xp.sin(slope)) for slope in slopes]
-    normals = [weight * xp.cos(slope) for slope in slopes]
-
-    def drive(state: State) -> PerObject:
-        pull = xp.where(state.is_on_ramp, *pulls)
-        return functools.reduce(lambda sum_, add: add(state, sum_), adds, pull)
-
-    def brake(state: State) -> PerObject:
-        return coefficient(state) * xp.where(state.is_on_ramp, *normals)
-
+    laws = _acting([e.friction(theta, scene) for e in effects], acts)
+    adds = _acting([_added(e.force(theta, scene)) for e in effects], acts)
+    coefficient, drive, brake = _forces(laws, adds, friction, mass, (ramp, table), scene)
     return Dynamics(
         mass=mass,
         inertia=mass if share is None else mass * (1.0 + share),
@@ -166,18 +141,52 @@ def dynamics(
     )
 
 
+def _forces(
+    laws: Sequence[Friction],
+    adds: Sequence[Friction],
+    friction: PerObject,
+    mass: PerObject,
+    slopes_rad: tuple[Array, Array],
+    scene: Surroundings,
+) -> tuple[Force, Force, Force]:
+    """Coefficient, drive and brake, as `Dynamics` has them."""
+    xp = mass.__array_namespace__()
+    # Once for each rollout: its loop has no need of sines.
+    weight = mass * xp.asarray(scene.gravity)[..., None]
+    slopes = [slope[..., None] for slope in slopes_rad]
+    # In the plane gravity has a direction of its own and is no force along the path.
+    pulls = [weight * (0.0 if scene.moves_in_plane else xp.sin(slope)) for slope in slopes]
+    normals = [weight * xp.cos(slope) for slope in slopes]
+
+    def coefficient(state: State) -> PerObject:
+        return functools.reduce(lambda k, law: law(state, k), laws, friction)
+
+    def drive(state: State) -> PerObject:
+        pull = xp.where(state.is_on_ramp, *pulls)
+        return functools.reduce(lambda sum_, add: add(state, sum_), adds, pull)
+
+    def brake(state: State) -> PerObject:
+        return coefficient(state) * xp.where(state.is_on_ramp, *normals)
+
+    return coefficient, drive, brake
+
+
 def _added(force: Force | None) -> Friction | None:
     """A force as what it makes of the sum of those before it."""
     return None if force is None else lambda state, total: total + force(state)
 
 
-def _if_acts(acts: Bool[Any, " effect"] | None, i: int, law: Friction | None) -> Friction | None:
-    """`law`, left out where effect `i` does not act."""
-    if acts is None or law is None:
-        return law
-    return lambda state, value: jax.lax.cond(
-        acts[i], lambda value: law(state, value), lambda value: value, value
-    )
+def _acting(laws: Sequence[Friction | None], acts: Bool[Any, " effect"] | None) -> list[Friction]:
+    """The laws that there are, of each effect one, each left out where its effect does not act."""
+    if acts is None:
+        return [law for law in laws if law is not None]
+
+    def if_acts(i: int, law: Friction) -> Friction:
+        return lambda state, value: jax.lax.cond(
+            acts[i], lambda value: law(state, value), lambda value: value, value
+        )
+
+    return [if_acts(i, law) for i, law in enumerate(laws) if law is not None]
 
 
 def _rim(mass: PerObject, scene: Surroundings) -> PerObject:
@@ -246,6 +255,7 @@ def pitch(position: OfCentres, scene: Surroundings) -> PerObject:
     return -scene.angle_rad * (1 - share)
 
 
-def _sum(given: Sequence[Array | None]) -> Array | None:
-    terms = [term for term in given if term is not None]
-    return functools.reduce(operator.add, terms) if terms else None
+def total(given: Sequence[Any | None]) -> Any | None:
+    """The sum of what is given; None where nothing is."""
+    terms = [each for each in given if each is not None]
+    return sum(terms[1:], terms[0]) if terms else None

@@ -92,13 +92,8 @@ def make_loads(
         force along the path     drive - M g sin A
         coefficient of friction  brake / (M g cos A)
 
-    The factor on the speed at the foot is a short zone of drag (or thrust) past it,
-
-        F = M ln(f) w(x) v |v|,   w a raised cosine over the zone with integral 1,
-
-    so that dv/dx = ln(f) w(x) v: what crosses the zone leaves it with f times the speed,
-    whatever its speed. Where slope or inertia differ from MuJoCo's, f makes up for what
-    MuJoCo's own contact keeps at the foot, too.
+    and past the foot `_foot_drag`. Where slope or inertia differ from MuJoCo's, its factor makes up
+    for what MuJoCo's own contact keeps at the foot, too.
     """
     xp = law.mass.__array_namespace__()
 
@@ -109,7 +104,6 @@ def make_loads(
     has_foot = scene.has_table and any(scene.comes_down) and (has("foot") or is_other_body)
     angle, weight = scene.angle_rad, law.inertia * scene.gravity
     log_foot = xp.log(xp.clip(law.foot, 0.5, 2.0))[..., None]
-    comes_down = xp.asarray(scene.comes_down, dtype=law.mass.dtype)
 
     def slope(state: State) -> PerObject:
         return xp.where(state.is_on_ramp, angle, 0.0)
@@ -126,17 +120,11 @@ def make_loads(
         native = math.cos(angle) - friction(state) * math.sin(angle)
         return log_foot + xp.log(xp.clip(kept / native, 0.5, 2.0))
 
-    def foot_drag(state: State) -> PerObject:
-        share = xp.clip(state.path_m / FOOT_ZONE_M, 0.0, 1.0)
-        window = (1 - xp.cos(2 * math.pi * share)) / FOOT_ZONE_M
-        speed = state.speed_m_s
-        return law.inertia * comes_down * log_kept(state) * window * speed * xp.abs(speed)
-
     def force(state: State) -> Array:
         down = slope(state)
         along = law.drive(state) - weight * xp.sin(down)
         if has_foot:
-            along = along + foot_drag(state)
+            along = along + _foot_drag(log_kept(state), state, law, scene)
         both = xp.stack([along * xp.cos(down), -along * xp.sin(down)], axis=-1)
         return both.reshape(*both.shape[:-2], -1)
 
@@ -145,6 +133,21 @@ def make_loads(
         friction=friction if has("friction") or is_other_body else None,
         is_steady=not (has("force") or has("friction")),
     )
+
+
+def _foot_drag(log_kept: PerObject, state: State, law: Dynamics, scene: Surroundings) -> PerObject:
+    """A short zone of drag (or thrust) past the foot, N, for a factor f on the speed there.
+
+        F = M ln(f) w(x) v |v|,   w a raised cosine over the zone with integral 1,
+
+    so that dv/dx = ln(f) w(x) v: what crosses the zone leaves it with f times the speed,
+    whatever its speed. `log_kept`: ln(f).
+    """
+    xp, speed = law.mass.__array_namespace__(), state.speed_m_s
+    comes_down = xp.asarray(scene.comes_down, dtype=law.mass.dtype)
+    share = xp.clip(state.path_m / FOOT_ZONE_M, 0.0, 1.0)
+    window = (1 - xp.cos(2 * math.pi * share)) / FOOT_ZONE_M
+    return law.inertia * comes_down * log_kept * window * speed * xp.abs(speed)
 
 
 def sliding_object(pair: str) -> int | None:

@@ -18,8 +18,8 @@ import numpy as np
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.disc_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
 from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.events import Motion, System, Task, total
-from galileo_jax.rollout.motion import state_at
+from galileo_jax.rollout.events import Motion, System, Task
+from galileo_jax.rollout.motion import state_at, total
 from galileo_jax.rollout.particle_free import start_velocity
 
 MAX_EVENTS = 16  # within one recorded step
@@ -61,7 +61,7 @@ def disc_system(task: Task) -> System:
 
 def _table(task: Task, shown: jax.Array) -> Table:
     """What does not change in a rollout; `shown`: how many times as large lengths look."""
-    effects, named, scene, _, _ = task
+    effects, named, scene, *_ = task
     rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
     walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
     if walls is not None:

@@ -14,17 +14,16 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.events import (
+    PLASTIC_M_S,
     Motion,
     System,
     Task,
     runge_kutta,
     to_crossing,
-    total,
 )
-from galileo_jax.rollout.motion import Dynamics, state_at
+from galileo_jax.rollout.motion import Dynamics, state_at, total
 
 MAX_BOUNCES = 8  # within one recorded step
-PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
 
 

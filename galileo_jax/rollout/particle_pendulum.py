@@ -22,8 +22,8 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
-from galileo_jax.rollout.events import Motion, System, Task, runge_kutta, to_crossing, total
-from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+from galileo_jax.rollout.events import Motion, System, Task, runge_kutta, to_crossing
+from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, total
 
 SUBSTEPS = 2
 MAX_EVENTS = 4  # within one recorded step

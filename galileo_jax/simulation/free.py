@@ -23,7 +23,6 @@ from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import extents
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.particle_free import (
-    PLASTIC_M_S,
     Body,
     floor_of,
     rates,
@@ -34,6 +33,7 @@ from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value,
 from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.pendulum import swung
+from galileo_jax.simulation.solver import PLASTIC_M_S
 from galileo_jax.simulation.to_event import Stretch, by_events
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from galileo_jax.rollout.motion import Dynamics
+from galileo_jax.simulation.solver import PLASTIC_M_S
 
-PLASTIC_M_S = 0.02  # slower impacts are plastic, as in every engine
 FAN_RAD, NUM_FAN, FAN_TIMES = 0.5, 41, 5  # directions that are tried, finer each time
 CLOSES_M = 1e-9  # within a step, what is about to meet
 

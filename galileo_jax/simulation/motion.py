@@ -158,12 +158,12 @@ def _roll_out_rigid(
     import jax
     import jax.numpy as jnp
 
-    from galileo_jax.rollout import engine_rigid
+    from galileo_jax.rollout import engine_path
 
     names = tuple(truth.theta)
     num_records = round(seconds / RECORD_S) + 1
     with jax.enable_x64(True):
-        rolled = jax.jit(engine_rigid.roll_out, static_argnums=(0, 1, 2, 3))(
+        rolled = jax.jit(engine_path.roll_out, static_argnums=(0, 1, 2, 3))(
             truth.motion_effects,
             names,
             num_records,

@@ -19,7 +19,7 @@ from galileo_jax.diagnosis.laws.grammar import structures
 from galileo_jax.diagnosis.laws.source import CLASS, law_class, name_of
 from galileo_jax.model.effects.effect import State
 from galileo_jax.rollout.engine_jax import _roll_out_batch
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.runtime.precision import in_float64
 from tests.ramp_model import HIT, make_model
 
@@ -79,7 +79,7 @@ def motions_of(*names: str):
     theta[:, [model.index("k1"), model.index("k2")]] = 0.2
     for row, name in zip(theta, names, strict=False):
         row[model.index(name)] = 0.7
-    engines = EngineRigid(model), EngineRigid(model, ActingFormulas(model, EVERY))
+    engines = EnginePath(model), EnginePath(model, ActingFormulas(model, EVERY))
     return [engine.simulate(theta)[0] for engine in engines]
 
 

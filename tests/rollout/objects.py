@@ -10,7 +10,7 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.scene import compile_scene, extents, rolling, start_paths
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 
 BOX = ClipObject(name="box", shape="box", size_m=(0.06, 0.06, 0.06))
 BALL = ClipObject(name="ball", shape="sphere", size_m=(0.03,))
@@ -68,6 +68,6 @@ def theta_of(
 
 def speeds(model: Model, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times `[record]` and speeds along the path `[object, record]` by the rigid engine."""
-    _, velocity = EngineRigid(model).simulate(theta[None])
+    _, velocity = EnginePath(model).simulate(theta[None])
     found = np.hypot(velocity[0, :, 0], velocity[0, :, 1]) * np.sign(velocity[0, :, 0])
     return np.arange(found.shape[-1]) * model.record_dt_s, found

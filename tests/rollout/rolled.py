@@ -4,14 +4,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.model.parameters import forward
+from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
 
 
 def rolled(engine: Engine, z: jax.Array | np.ndarray) -> Trajectory:
     """The motion at `z` `[parameter]`; no pitch of its own."""
-    position, velocity = in_jax(engine)(forward(engine.model.parameters, jnp.asarray(z)[None]))
+    position, velocity = in_jax(engine)(
+        PriorTable.of(engine.model.parameters).forward(jnp.asarray(z)[None])
+    )
     times = jnp.arange(position.shape[-1]) * engine.model.record_dt_s
     return Trajectory(times, position[0], velocity[0])
 

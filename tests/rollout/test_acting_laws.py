@@ -8,7 +8,7 @@ import pytest
 
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.rollout.acting_laws import ActingLaws
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_model, make_theta
 
@@ -75,7 +75,7 @@ def test_rollouts_are_those_of_the_whole_model(model):
     values = [{}, {"air_drag": 0.3}, {"friction_patch": 0.1}]
     theta = np.concatenate([thetas(model, 16, **own) for own in values])
     theta = theta[np.random.default_rng(1).permutation(len(theta))]
-    engine = EngineRigid(model)
+    engine = EnginePath(model)
     whole = jax.jit(engine.traceable)(theta)
     for one, other in zip(engine.simulate(theta), whole, strict=True):
         np.testing.assert_allclose(one, other, atol=ROUNDING_M)
@@ -83,7 +83,7 @@ def test_rollouts_are_those_of_the_whole_model(model):
 
 
 def test_a_rollout_lasts_until_nobody_looks(model):
-    engine, theta = EngineRigid(model), thetas(model, 2)
+    engine, theta = EnginePath(model), thetas(model, 2)
     whole, speed = engine.simulate(theta)
     until = np.array([0.2, 0.3])
     short, its_speed = engine.rolled(theta, until)

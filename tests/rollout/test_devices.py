@@ -15,14 +15,14 @@ import numpy as np
 
 jax.config.update("jax_enable_x64", True)
 from galileo_jax.runtime import compilation_cache
-from galileo_jax.model.parameters import forward
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.model.parameters import PriorTable
+from galileo_jax.rollout.engine_path import EnginePath
 from tests.ramp_model import HIT, make_model
 
 compilation_cache.enable()
-engine = EngineRigid(make_model(HIT, 1.2))
+engine = EnginePath(make_model(HIT, 1.2))
 z = np.random.default_rng(0).standard_normal((20, len(engine.model.parameters)))
-theta = np.asarray(forward(engine.model.parameters, jnp.asarray(z)))
+theta = np.asarray(PriorTable.of(engine.model.parameters).forward(jnp.asarray(z)))
 position, _ = engine.traceable(jnp.asarray(theta[:16]))
 print(len(position.sharding.device_set))
 np.save(sys.argv[1], np.stack(engine.simulate(theta)))

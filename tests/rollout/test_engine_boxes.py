@@ -10,10 +10,11 @@ import pytest
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.model import Model
-from galileo_jax.rollout.engine_boxes import EngineBoxes, roll_out_poses
+from galileo_jax.rollout.engine_boxes import EngineBoxes, free_poses
 from galileo_jax.rollout.engine_c_free import EngineCFree
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.rollout.events import of_task
 from galileo_jax.rollout.free_start import with_depths
 from galileo_jax.runtime.errors import InputError
 from tests.precision import in_64_bit
@@ -55,7 +56,7 @@ def of_boxes(objects: list[ClipObject], *effects: str) -> Model:
 def poses_of(model: Model, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places and velocities `[object, 3, record]` and quaternions."""
     effects, scene = model.effects + model.nuisances, with_depths(model.scene)
-    found = jax.jit(roll_out_poses, static_argnums=(0, 1, 2, 3))(
+    found = jax.jit(of_task(free_poses), static_argnums=(0, 1, 2, 3))(
         effects, model.names, model.num_records + 1, model.record_dt_s, jnp.asarray(theta), scene
     )
     place, speed, turned = (np.asarray(own) for own in found)
@@ -72,7 +73,7 @@ def test_squarely_it_is_motion_in_a_plane(mass_kg, friction):
     for given in ({}, {"air_drag": 0.05}, {"restitution": 0.4}):
         theta = theta_of(model, mass_kg, friction, **given)[None]
         position, _ = EngineBoxes(model).simulate(theta)
-        expected, speed = EngineRigid(model).simulate(theta)
+        expected, speed = EnginePath(model).simulate(theta)
         assert np.ptp(expected[0, 1, 0]) > 0.005, "object 2 is pushed on"
         hit = hit_record(speed[0])
         away = np.delete(np.arange(speed.shape[-1]), [hit - 1, hit, hit + 1])

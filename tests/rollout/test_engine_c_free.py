@@ -10,7 +10,7 @@ import pytest
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.rollout.engine_c_free import EngineCFree
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.errors import InputError
 from tests.rollout.free_boxes import (
@@ -47,7 +47,7 @@ def test_agrees_with_motion_in_a_plane(mass_kg, friction):
     model = model_of(cubes())
     theta = theta_of(model, mass_kg, friction)[None]
     position, velocity = EngineCFree(model).simulate(theta)
-    expected, speed = EngineRigid(model).simulate(theta)
+    expected, speed = EnginePath(model).simulate(theta)
     hit = int(np.argmax(speed[0, 1, 0] > 0.01))
     assert np.ptp(expected[0, 1, 0]) > 0.01, "object 2 is pushed on"
     after = np.arange(speed.shape[-1]) >= hit + round(AFTER_HIT_S / model.record_dt_s)
@@ -63,7 +63,7 @@ def test_an_effect_acts_on_free_bodies():
     drag = without.copy()
     drag[model.index("air_drag")] = 0.3
     free, _ = EngineCFree(model).simulate(np.stack([without, drag]))
-    planar, _ = EngineRigid(model).simulate(np.stack([without, drag]))
+    planar, _ = EnginePath(model).simulate(np.stack([without, drag]))
     moved = np.abs(planar[1] - planar[0])[:, 0, -1]
     assert moved.min() > 0.02
     assert np.abs(free - planar)[..., -1].max() < PLANAR_ATOL_M

@@ -10,7 +10,7 @@ import pytest
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engine_mjx import EngineMJX
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, make_fields
 from tests.precision import in_64_bit
@@ -176,7 +176,7 @@ def test_c_and_rigid_agree_on_effects(effect):
     """Two engines that share the equations of motion and nothing of how they are solved."""
     model, theta = with_effect(make_model(HIT, 1.5), effect)
     (position_c, velocity_c), (position, velocity) = (
-        engine(model).simulate(theta) for engine in (EngineC, EngineRigid)
+        engine(model).simulate(theta) for engine in (EngineC, EnginePath)
     )
     assert position_c == pytest.approx(position, abs=RIGID_POSITION_ATOL_M)
     assert np.abs(position[0] - position[1]).max() > 5 * RIGID_POSITION_ATOL_M

@@ -8,7 +8,7 @@ import pytest
 
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.rollout.engine_c import EngineC
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from tests.ramp_model import HIT, make_model, make_theta
 
 STRONG_Z = 0.7  # where in its prior each parameter is
@@ -31,7 +31,7 @@ def test_c_and_rigid_agree(name):
     }
     theta = np.stack([make_theta(model, HIT, given) for given in (strong, {})])
     found, _ = EngineC(model).simulate(theta)
-    wanted, _ = EngineRigid(model).simulate(theta)
+    wanted, _ = EnginePath(model).simulate(theta)
     atol = BOUNCE_ATOL_M if name == "restitution" else POSITION_ATOL_M
     assert found == pytest.approx(wanted, abs=atol)
     moves = any(p.step is not None for p in effect.parameters(model.scene.surroundings))

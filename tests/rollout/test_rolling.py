@@ -10,7 +10,7 @@ import pytest
 
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.solver import STEP_S, STEPS_PER_RECORD, solve
@@ -120,7 +120,7 @@ def test_small_steps_agree(case, restitution):
     scene = scene_of(objects, 25.0, 0.45, [0.25, 0.34])
     model = model_of(objects, scene, 2.0)
     theta = theta_of(model, mass, friction, impact_restitution=restitution)
-    position, _ = EngineRigid(model).simulate(theta[None])
+    position, _ = EnginePath(model).simulate(theta[None])
     named = {name: float(theta[i]) for i, name in enumerate(model.names)}
     path, _, _ = solve(model.nuisances, scene, named, 2.0)
     moments = np.arange(len(path)) * STEP_S * STEPS_PER_RECORD
@@ -183,7 +183,7 @@ def test_derivatives_are_those_of_the_motion():
     model = model_of(objects, scene_of(objects, 20.0, 0.5, [0.25]), 1.2)
     theta = theta_of(model, [0.5, 0.3], [0.3, 0.1], impact_restitution=0.3, contact_gap=3e-4)
     z = inverse(model.parameters, jnp.asarray(theta))
-    engine = EngineRigid(model)
+    engine = EnginePath(model)
     times = jnp.asarray([0.2, 0.4, 1.1, 1.15])
 
     slopes, differences = derivatives(engine, z, times, STEP_Z)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.model.effects.effect import Theta
-from galileo_jax.model.parameters import forward, inverse
+from galileo_jax.model.parameters import PriorTable, inverse
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import at_times
@@ -85,7 +85,7 @@ def test_unknown_engines_are_refused(model):
 
 def test_rollouts_of_effects_see_their_parameters(model, start):
     """`theta` reaches effects by name."""
-    named: Theta = model.by_name(np.asarray(forward(model.parameters, start)))
+    named: Theta = model.by_name(np.asarray(PriorTable.of(model.parameters).forward(start)))
     assert float(named["k2"]) == pytest.approx(HIT.friction[1])
     with pytest.raises(ValueError, match="unknown parameter 'k3'; known: m1, k1"):
         model.index("k3")

@@ -10,8 +10,9 @@ the plane of the picture. Hooks see and return numbers along it, positive downhi
 the ramp; in the plane, along the velocity.
 """
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, NamedTuple
 
 import jax
@@ -96,33 +97,9 @@ Force = Callable[[State], PerObject]
 Push = Callable[[Float[AnyArray, " axis"], Float[AnyArray, ""]], Float[AnyArray, " axis"]]
 Friction = Callable[[State, PerObject], PerObject]
 
-_ARRAYS = (
-    "angle_rad",
-    "gravity",
-    "half_length_m",
-    "half_height_m",
-    "corner_m",
-    "start_m",
-    "start_path_m",
-    "mass_kg",
-    "roll_inertia",
-    "is_box",
-    "release_s",
-    "expected",
-    "walls_m",
-    "half_depth_m",
-    "beside_m",
-)
 _STATIC = (
-    "names",
-    "has_table",
-    "comes_down",
-    "is_scale_known",
-    "is_scale_stated",
-    "has_surface",
-    "rolls",
-    "moves_in_plane",
-    "laws",
+    *("names", "has_table", "comes_down", "is_scale_known", "is_scale_stated"),
+    *("has_surface", "rolls", "moves_in_plane", "laws"),
 )
 
 
@@ -248,6 +225,12 @@ class Surroundings:
         return value[..., None] * value.__array_namespace__().asarray(chosen)
 
 
+Place = Callable[[Surroundings], bool]
+
+
+_ARRAYS = tuple(one.name for one in fields(Surroundings) if one.name not in _STATIC)
+
+
 class Effect:
     """One physical (or measurement) effect.
 
@@ -258,6 +241,15 @@ class Effect:
     """
 
     name: ClassVar[str]
+
+    def __init_subclass__(cls, where: Place | None = None) -> None:
+        """`where` tells in which scenes the effect has a place; in others its hooks do nothing."""
+        super().__init_subclass__()
+        if where is None:
+            return
+        for hook in HOOKS:
+            if (own := getattr(cls, hook)) is not (absent := getattr(Effect, hook)):
+                setattr(cls, hook, _in_place(where, own, absent))
 
     def __eq__(self, other: object) -> bool:
         """Whether the other does the same, also to a compiled program."""
@@ -276,7 +268,7 @@ class Effect:
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The unknowns it brings, the strength first; empty where it has no place."""
-        raise NotImplementedError
+        return ()
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """How many times as likely as its prior says it is to be there, at these values.
@@ -400,6 +392,19 @@ class Effect:
     ) -> Float[AnyArray, "object axis frame"]:
         """Maps true centres to measured ones, `[object, axis, frame]`, m (scale, camera)."""
         return position_m
+
+
+HOOKS = {name for name in vars(Effect) if not name.startswith("_")} - {"identity", "name"}
+
+
+def _in_place(where: Place, own: Any, absent: Any) -> Any:
+    """The hook `own` of an effect; `absent` in a scene, the last argument, without a place."""
+
+    @functools.wraps(own)
+    def hook(self: Effect, *arguments: Any) -> Any:
+        return (own if where(arguments[-1]) else absent)(self, *arguments)
+
+    return hook
 
 
 def true_surroundings(effects: Sequence[Effect], theta: Theta, scene: Surroundings) -> Surroundings:

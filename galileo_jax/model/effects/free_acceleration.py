@@ -11,7 +11,7 @@ Processes for Machine Learning (2006), section 4.2.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -69,7 +69,7 @@ class FreeAcceleration(Effect):
 
     spans_s: tuple[tuple[Span, ...], ...]
 
-    name: ClassVar[str] = "free_acceleration"
+    name = "free_acceleration"
 
     def identity(self) -> tuple[Any, ...]:
         """The class: its attributes reach hooks as parameters."""

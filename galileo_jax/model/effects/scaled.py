@@ -6,17 +6,20 @@ Source: Hartley and Zisserman, Multiple View Geometry (2004), chapter 6 (a camer
 a plane scales it).
 """
 
-from galileo_jax.model.effects.effect import Array, Surroundings
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 
 
-def unscaled(path_m: Array, error: Array) -> Array:
-    """True starts `[..., object]` of those that were read from the measured track."""
-    return path_m / (1.0 + error[..., None])
+class Scaled(Effect):
+    """A scale that is off by a share s, the parameter of the effect's name."""
 
+    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """The true starts, of those that were read from the measured track."""
+        return path_m / (1.0 + theta[self.name][..., None])
 
-def scaled(position_m: Array, error: Array | float, scene: Surroundings) -> Array:
-    """True centres `[object, 2, frame]` as they are measured."""
-    if scene.has_table:
-        return position_m + error * position_m
-    origin = position_m.__array_namespace__().asarray(scene.start_m[0])[:, None]
-    return position_m + error * (position_m - origin)
+    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """The centres as the declared scale shows them."""
+        error = theta[self.name]
+        if scene.has_table:
+            return position_m + error * position_m
+        origin = position_m.__array_namespace__().asarray(scene.start_m[0])[:, None]
+        return position_m + error * (position_m - origin)

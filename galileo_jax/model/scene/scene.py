@@ -139,24 +139,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     else:
         angle = 0.0 if scenario.moves_in_plane else math.pi / 2
     half = [extents(declared) for declared in clip.objects]
-    starts: list[tuple[float, ...]] = []
-    for i, (name, (_, height)) in enumerate(zip(observation.names, half, strict=True)):
-        seen = np.flatnonzero(observation.mask[i])
-        if not seen.size:
-            raise InputError(f"{clip.path}: {name} is not seen in any frame")
-        x, y = observation.position_m[i, :2, seen[0]]
-        if not has_table:
-            starts.append(tuple(map(float, observation.position_m[i, :, seen[0]])))
-        elif i == 0:
-            along = x * math.cos(angle) - y * math.sin(angle)
-            starts.append(_on_ramp(along, height, angle))
-        else:
-            starts.append((float(x), height))
-            if x < starts[i - 1][0]:
-                raise InputError(
-                    f"{clip.path}: objects[{i}]: {name} stands before {observation.names[i - 1]}; "
-                    "objects in the order of the travel expected"
-                )
+    starts = _starts(clip, observation, [height for _, height in half], angle)
     corner = tuple(h * math.tan(angle / 2) if has_table else math.inf for _, h in half)
     surroundings = Surroundings(
         names=observation.names,
@@ -165,8 +148,8 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         half_length_m=tuple(length for length, _ in half),
         half_height_m=tuple(height for _, height in half),
         corner_m=corner,
-        start_m=tuple(starts),
-        start_path_m=start_paths(tuple(starts), corner, angle),
+        start_m=starts,
+        start_path_m=start_paths(starts, corner, angle),
         has_table=has_table,
         comes_down=tuple(
             has_table and bool(at[0] < c) for at, c in zip(starts, corner, strict=True)
@@ -184,6 +167,31 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         walls_m=tuple(wall.ends_m for wall in clip.walls),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+
+
+def _starts(
+    clip: Clip, observation: Observation, heights_m: Sequence[float], angle: float
+) -> tuple[tuple[float, ...], ...]:
+    """The centres at the start, of objects of half these heights; raises as `build_scene`."""
+    starts: list[tuple[float, ...]] = []
+    for i, (name, height) in enumerate(zip(observation.names, heights_m, strict=True)):
+        seen = np.flatnonzero(observation.mask[i])
+        if not seen.size:
+            raise InputError(f"{clip.path}: {name} is not seen in any frame")
+        x, y = observation.position_m[i, :2, seen[0]]
+        if not SCENARIOS[clip.scenario].has_table:
+            starts.append(tuple(map(float, observation.position_m[i, :, seen[0]])))
+        elif i == 0:
+            along = x * math.cos(angle) - y * math.sin(angle)
+            starts.append(_on_ramp(along, height, angle))
+        else:
+            starts.append((float(x), height))
+            if x < starts[i - 1][0]:
+                raise InputError(
+                    f"{clip.path}: objects[{i}]: {name} stands before {observation.names[i - 1]}; "
+                    "objects in the order of the travel expected"
+                )
+    return tuple(starts)
 
 
 def laws_of(clip: Clip) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.scene import compile_scene
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
 from tests.ramp_model import HIT, make_model, make_surroundings, make_theta
@@ -89,10 +89,10 @@ class Motion:
 
 
 @functools.cache
-def library_engine(experiment: Experiment) -> EngineRigid:
+def library_engine(experiment: Experiment) -> EnginePath:
     """The engine with the whole library; only the experiment's geometry matters."""
     model = make_model(experiment, DURATION_S)
-    return EngineRigid(replace(model, effects=make_effects(LIBRARY)))
+    return EnginePath(replace(model, effects=make_effects(LIBRARY)))
 
 
 def geometry(experiment: Experiment) -> Experiment:

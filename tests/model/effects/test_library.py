@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.effects.effect import State
-from galileo_jax.model.parameters import absent, forward, inverse
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.model.parameters import PriorTable, absent, inverse
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.motion import dynamics, state_at
 from tests.model.effects.motion import (
     INCLINE,
@@ -76,7 +76,7 @@ def test_parameters(name):
         assert (parameter.step is None) == (name in MEASURED)
         assert parameter.per_clip == (name in {"release_delay", "initial_push"})
     z = jnp.linspace(-2.0, 2.0, 5)[:, None] * jnp.ones(1 + len(others))
-    theta = forward((strength, *others), z)
+    theta = PriorTable.of((strength, *others)).forward(z)
     assert np.isfinite(theta).all() and (np.diff(theta, axis=0) > 0).all()
     assert inverse((strength, *others), theta) == pytest.approx(np.asarray(z), abs=1e-9)
 
@@ -95,7 +95,7 @@ def engines():
     """Of each scene: without and with the whole library."""
     with in_64_bit():
         return {
-            name: [EngineRigid(model_of(scene, names)) for names in ((), LIBRARY)]
+            name: [EnginePath(model_of(scene, names)) for names in ((), LIBRARY)]
             for name, scene in SCENES.items()
         }
 
@@ -150,7 +150,7 @@ def test_slopes_at_absent_are_finite_and_right(scene, engines):
 def draw(engine, rng, count):
     """Random parameters of everything, `[count, parameter]`."""
     z = rng.normal(size=(count, len(engine.model.parameters)))
-    return np.asarray(forward(engine.model.parameters, jnp.asarray(z)))
+    return np.asarray(PriorTable.of(engine.model.parameters).forward(jnp.asarray(z)))
 
 
 def test_numpy_and_jax_agree():

@@ -15,7 +15,7 @@ from galileo_jax.model.effects import (
     registry,
 )
 from galileo_jax.model.effects.effect import State
-from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.runtime.errors import InputError
 from tests.model.effects.motion import (
     LIBRARY,
@@ -92,7 +92,7 @@ def test_the_example_is_an_effect_like_any_other():
 def test_the_example_rolls_out():
     """Without friction dv/dq = -c v^2 / m: 1 / v grows by c / m per metre."""
     load_file(EXAMPLE)
-    engine = EngineRigid(model_of(make_surroundings(LONG_TABLE), ("cubic_drag",)))
+    engine = EnginePath(model_of(make_surroundings(LONG_TABLE), ("cubic_drag",)))
     theta = absent_theta(engine.model, (0.5, 0.3), (0.0, 0.0))
     theta[engine.model.index("cubic_drag")] = 0.7
     position, velocity = engine.simulate(theta[None])

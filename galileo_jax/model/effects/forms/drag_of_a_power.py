@@ -3,9 +3,7 @@
 F = -drag_of_a_power (|v| / V)^power sign(v)    on every object; V = 1 m/s, in a fall 10 m/s
 """
 
-from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
@@ -22,16 +20,14 @@ SMALL = 0.01  # of the usual speed: there the slope of a root ends
 class DragOfAPower(Form):
     """Drag of all objects by a law that has no name."""
 
-    name: ClassVar[str] = "drag_of_a_power"
-    meaning: ClassVar[str] = "a drag that grows with another power of the speed"
-    family: ClassVar[str] = "power_v"
-    nature: ClassVar[str] = "drag"
-    how_likely: ClassVar[float] = 0.05  # drags are well known: nearly all have a power with a name
-    constant: ClassVar[str] = "power"
-    constant_words: ClassVar[str] = "the power of the speed"
-    named_values: ClassVar[Mapping[str, float]] = MappingProxyType(
-        {"viscous_drag": 1.0, "air_drag": 2.0}
-    )
+    name = "drag_of_a_power"
+    meaning = "a drag that grows with another power of the speed"
+    family = "power_v"
+    nature = "drag"
+    how_likely = 0.05  # drags are well known: nearly all have a power with a name
+    constant = "power"
+    constant_words = "the power of the speed"
+    named_values = MappingProxyType({"viscous_drag": 1.0, "air_drag": 2.0})
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag at the usual speed, and the power."""

@@ -4,7 +4,6 @@ a(t) = force_at_a_time exp(-((t - moment) / duration)^2),    F = m a
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
@@ -19,11 +18,11 @@ LEAST_WAY_M = 0.2
 class ForceAtATime(Form):
     """An acceleration of object 1 at one moment of each trial."""
 
-    name: ClassVar[str] = "force_at_a_time"
-    meaning: ClassVar[str] = "a push or pull on object 1 at one moment"
-    family: ClassVar[str] = "pulse_t"
-    nature: ClassVar[str] = "push"
-    is_on_all: ClassVar[bool] = False
+    name = "force_at_a_time"
+    meaning = "a push or pull on object 1 at one moment"
+    family = "pulse_t"
+    nature = "push"
+    is_on_all = False
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How strong, when, and how long."""

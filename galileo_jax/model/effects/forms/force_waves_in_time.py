@@ -6,7 +6,6 @@ A = force_waves_in_time, B = force_waves_in_time_later.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
@@ -20,10 +19,10 @@ PERIOD_PRIOR = LogNormal(median=0.2, sd=0.7)
 class ForceWavesInTime(Form):
     """An acceleration of all objects that waves in time."""
 
-    name: ClassVar[str] = "force_waves_in_time"
-    meaning: ClassVar[str] = "a force that oscillates in time"
-    family: ClassVar[str] = "wave_t"
-    nature: ClassVar[str] = "push"
+    name = "force_waves_in_time"
+    meaning = "a force that oscillates in time"
+    family = "wave_t"
+    nature = "push"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a period apart, and the period."""

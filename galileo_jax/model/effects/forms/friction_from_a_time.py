@@ -7,7 +7,6 @@ than the rest of the way.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.force_at_a_time import LAST_FALLS, LEAST_WAY_M
@@ -18,18 +17,16 @@ PRIOR = Normal(0.0, 0.2)  # as of a patch
 EDGE_S = 0.02
 
 
-class FrictionFromATime(Form):
+class FrictionFromATime(Form, where=lambda scene: scene.has_surface):
     """Another coefficient of object 1 from one moment of each trial on."""
 
-    name: ClassVar[str] = "friction_from_a_time"
-    meaning: ClassVar[str] = "friction of object 1 that changes at one moment"
-    family: ClassVar[str] = "step_t"
-    is_on_all: ClassVar[bool] = False
+    name = "friction_from_a_time"
+    meaning = "friction of object 1 that changes at one moment"
+    family = "step_t"
+    is_on_all = False
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By how much, and when; none in a fall."""
-        if not scene.has_surface:
-            return ()
         way = max(abs(scene.start_path_m[0]), LEAST_WAY_M)
         last = LAST_FALLS * math.sqrt(2 * way / scene.gravity)
         moment = Uniform(0.0, last)
@@ -38,10 +35,8 @@ class FrictionFromATime(Form):
             Parameter(f"{self.name}_moment", "s", moment, last / 2, "effect", 0.1, per_clip=True),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the time."""
-        if not scene.has_surface:
-            return None
         rougher = scene.only(theta[self.name], 0)
         moment = theta[f"{self.name}_moment"][..., None]
 

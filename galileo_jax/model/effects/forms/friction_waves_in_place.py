@@ -6,7 +6,6 @@ A = friction_waves_in_place, B = friction_waves_in_place_later, q along the path
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
@@ -17,17 +16,15 @@ PRIOR = Normal(0.0, 0.1)
 LENGTH_PRIOR = LogNormal(median=0.2, sd=0.7)
 
 
-class FrictionWavesInPlace(Form):
+class FrictionWavesInPlace(Form, where=lambda scene: scene.has_surface):
     """Coefficients of all objects that wave along the path."""
 
-    name: ClassVar[str] = "friction_waves_in_place"
-    meaning: ClassVar[str] = "friction that goes up and down along the path"
-    family: ClassVar[str] = "wave_q"
+    name = "friction_waves_in_place"
+    meaning = "friction that goes up and down along the path"
+    family = "wave_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a wave apart, and its length; none in a fall."""
-        if not scene.has_surface:
-            return ()
         usual = LENGTH_PRIOR.median
         return (
             Parameter(self.name, "1", PRIOR, 0.0, "effect", 0.1),
@@ -35,10 +32,8 @@ class FrictionWavesInPlace(Form):
             Parameter(f"{self.name}_length", "m", LENGTH_PRIOR, usual, "effect", 0.1),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not scene.has_surface:
-            return None
         first, later = theta[self.name][..., None], theta[f"{self.name}_later"][..., None]
         rate = (2 * math.pi / theta[f"{self.name}_length"])[..., None]
 

@@ -3,8 +3,6 @@
 k(q) = max(0, k (1 + friction_with_place q))    for every object, q along the path
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
 from galileo_jax.model.parameters import Normal, Parameter
@@ -12,23 +10,19 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, 1.0)
 
 
-class FrictionWithPlace(Form):
+class FrictionWithPlace(Form, where=lambda scene: scene.has_surface):
     """Coefficients of all objects that change along the path."""
 
-    name: ClassVar[str] = "friction_with_place"
-    meaning: ClassVar[str] = "friction that grows or falls along the path"
-    family: ClassVar[str] = "linear_q"
+    name = "friction_with_place"
+    meaning = "friction that grows or falls along the path"
+    family = "linear_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per metre; none in a fall."""
-        if not scene.has_surface:
-            return ()
         return (Parameter(self.name, "1/m", PRIOR, 0.0, "effect", 0.1),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not scene.has_surface:
-            return None
         share = theta[self.name][..., None]
 
         def law(state: State, k: Array) -> Array:

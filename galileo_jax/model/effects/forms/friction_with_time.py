@@ -3,8 +3,6 @@
 k(t) = max(0, k (1 + friction_with_time t))    for every object, t since the release
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.forms.form import Form
 from galileo_jax.model.parameters import Normal, Parameter
@@ -12,23 +10,19 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, 1.0)
 
 
-class FrictionWithTime(Form):
+class FrictionWithTime(Form, where=lambda scene: scene.has_surface):
     """Coefficients of all objects that change with time."""
 
-    name: ClassVar[str] = "friction_with_time"
-    meaning: ClassVar[str] = "friction that grows or falls with time"
-    family: ClassVar[str] = "power_t"
+    name = "friction_with_time"
+    meaning = "friction that grows or falls with time"
+    family = "power_t"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per second; none in a fall."""
-        if not scene.has_surface:
-            return ()
         return (Parameter(self.name, "1/s", PRIOR, 0.0, "effect", 0.1),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the time."""
-        if not scene.has_surface:
-            return None
         share = theta[self.name][..., None]
 
         def law(state: State, k: Array) -> Array:

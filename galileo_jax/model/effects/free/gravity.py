@@ -8,8 +8,6 @@ the friction k. Whatever scales lengths or times (`pixels_per_metre`, `scale_err
 Source: Galilei, Discorsi (1638), third day.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.free_quantities import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -21,13 +19,13 @@ PRIOR_SD = 0.2  # of the logarithm: 8.0 to 12.0 m/s^2 where 9.81 is declared
 class Gravity(Effect):
     """Gravity is unknown, the same in all clips; what is declared is the prior's median."""
 
-    name: ClassVar[str] = "gravity"
+    name = "gravity"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The acceleration of free fall, m/s^2."""
         prior = LogNormal(scene.gravity, PRIOR_SD)
         return (Parameter("gravity", "m/s^2", prior, scene.gravity, "main", 0.05),)
 
-    def gravity(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def gravity(self, theta: Theta, scene: Surroundings) -> Array:
         """As inferred."""
         return theta["gravity"]

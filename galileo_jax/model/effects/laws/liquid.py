@@ -14,7 +14,6 @@ Fluid Dynamics (1967), sections 5.11 and 6.8.
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -24,25 +23,21 @@ ADDED_MASS = 0.5  # of the displaced liquid's, for a sphere
 DRAG_PRIOR = LogNormal(median=0.1, sd=1.5)
 
 
-class Liquid(Effect):
+class Liquid(Effect, where=lambda scene: "liquid" in scene.laws):
     """What a liquid does to a body in it."""
 
-    name: ClassVar[str] = "liquid"
+    name = "liquid"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The ratio of the densities and the drag constant c."""
-        if self.name not in scene.laws:
-            return ()
         ratio = LogNormal(*scene.expected["density_ratio"])
         return (
             Parameter("density_ratio", "1", ratio, 0.0, "main", 0.05),
             Parameter("liquid_drag", "kg/m", DRAG_PRIOR, 0.0, "main", 0.1),
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """Buoyancy and drag."""
-        if self.name not in scene.laws:
-            return None
         lift = (theta["density_ratio"] * theta["m1"] * scene.gravity)[..., None]
         constant = theta["liquid_drag"][..., None]
 
@@ -51,15 +46,11 @@ class Liquid(Effect):
 
         return push
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
         """The liquid carried along."""
-        if self.name not in scene.laws:
-            return None
         return ADDED_MASS * theta["density_ratio"][..., None]
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """The speed at which drag and weight balance."""
-        if self.name not in scene.laws:
-            return {}
         pull = theta["m1"] * scene.gravity * abs(1.0 - theta["density_ratio"])
         return {"terminal_speed": ((pull / theta["liquid_drag"]) ** 0.5, "m/s")}

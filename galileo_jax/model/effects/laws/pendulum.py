@@ -14,7 +14,6 @@ Source: Huygens, Horologium oscillatorium (1673); Baker and Blackburn, The Pendu
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
@@ -22,15 +21,13 @@ from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 LENGTH, ANGLE = "thread_length", "start_angle"
 
 
-class Pendulum(Effect):
+class Pendulum(Effect, where=lambda scene: PENDULUM in scene.laws):
     """A bob on a thread or a rod."""
 
-    name: ClassVar[str] = PENDULUM
+    name = PENDULUM
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The length, and each clip's angle at the start."""
-        if self.name not in scene.laws:
-            return ()
         length = LogNormal(*scene.expected[LENGTH])
         angle = Normal(*scene.expected[ANGLE])
         return (
@@ -40,8 +37,6 @@ class Pendulum(Effect):
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """The period of small swings, and where the pivot is."""
-        if self.name not in scene.laws:
-            return {}
         length, angle = theta[LENGTH], theta[ANGLE]
         xp = length.__array_namespace__()
         x, y, *_ = scene.start_m[0]

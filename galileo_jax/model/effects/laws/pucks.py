@@ -21,7 +21,6 @@ Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase f
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter, Role, Uniform
@@ -32,15 +31,13 @@ OFFSET = (
 START = ("start_velocity_x", "start_velocity_y", "start_turning")
 
 
-class Pucks(Effect):
+class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
     """Start velocities, the rims' restitution and grip, and where exactly they meet."""
 
-    name: ClassVar[str] = "pucks"
+    name = "pucks"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Of what moves when it is first seen its velocities; of several pucks what a hit does."""
-        if self.name not in scene.laws:
-            return ()
         units = ("m/s", "m/s", "rad/s")
         # Turning that is not in the track is known from the picture, and no result of the fit.
         roles: tuple[Role, ...] = ("main", "main", "main" if scene.num_axes == 3 else "nuisance")
@@ -63,10 +60,8 @@ class Pucks(Effect):
             ]
         return tuple(found)
 
-    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array:
         """Of every puck, the turning too; 0 of those that rest."""
-        if self.name not in scene.laws:
-            return None
         zero = 0.0 * theta["m1"]
         rows = [
             [theta[name] if name in scene.expected else zero for name in _starts(i)]
@@ -75,10 +70,8 @@ class Pucks(Effect):
         xp = zero.__array_namespace__()
         return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
 
-    def rims(self, theta: Theta, scene: Surroundings) -> Rims | None:
+    def rims(self, theta: Theta, scene: Surroundings) -> Rims:
         """What a hit does, and where the pucks are beside where they were seen."""
-        if self.name not in scene.laws:
-            return None
         zero = 0.0 * theta["m1"]
         xp = zero.__array_namespace__()
         places = [xp.stack([zero, zero], axis=-1)]
@@ -90,7 +83,7 @@ class Pucks(Effect):
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """Where nobody knows how long a metre is: decelerations in radii of the puck."""
-        if self.name not in scene.laws or scene.is_scale_known:
+        if scene.is_scale_known:
             return {}
         return {
             f"deceleration{i + 1}": (

@@ -13,7 +13,6 @@ Source: Hooke, De potentia restitutiva (1678); Taylor, Classical Mechanics (2005
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
@@ -21,15 +20,13 @@ from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 DAMPING_PRIOR = LogNormal(median=0.1, sd=1.5)
 
 
-class Spring(Effect):
+class Spring(Effect, where=lambda scene: "spring" in scene.laws):
     """A hanging spring."""
 
-    name: ClassVar[str] = "spring"
+    name = "spring"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Period without damping, damping, and where the object would hang at rest."""
-        if self.name not in scene.laws:
-            return ()
         period, rest = LogNormal(*scene.expected["period"]), Normal(*scene.expected["rest"])
         return (
             Parameter("period", "s", period, period.median, "main", 0.02),
@@ -37,10 +34,8 @@ class Spring(Effect):
             Parameter("rest", "m", rest, 0.0, "main", 0.02, per_clip=True),
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The pull to the place of rest, gravity's part in it taken out, and the damping."""
-        if self.name not in scene.laws:
-            return None
         mass = theta["m1"][..., None]
         stiffness = mass * (2 * math.pi / theta["period"][..., None]) ** 2
         rubbing = 2 * mass * theta["damping"][..., None]
@@ -53,8 +48,6 @@ class Spring(Effect):
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """Stiffness, and how far the weight stretches the spring."""
-        if self.name not in scene.laws:
-            return {}
         square = (2 * math.pi / theta["period"]) ** 2
         return {
             "stiffness": (theta["m1"] * square, "N/m"),

@@ -13,7 +13,6 @@ A throw, a swing that is under way, a body that was let go before the clip begin
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
@@ -24,15 +23,13 @@ PATH = ("start_speed",)
 LAUNCH = "launch_angle"
 
 
-class StartVelocity(Effect):
+class StartVelocity(Effect, where=lambda scene: "start_velocity" in scene.laws):
     """The velocity in the first frame; each clip has its own."""
 
-    name: ClassVar[str] = "start_velocity"
+    name = "start_velocity"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Its components in the plane (and a launcher's angle), or the speed along the path."""
-        if self.name not in scene.laws:
-            return ()
         found = [
             Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
             for name in (SPACE[: scene.num_axes] if scene.is_thrown else PATH)
@@ -44,20 +41,20 @@ class StartVelocity(Effect):
 
     def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
         """In the plane."""
-        if self.name not in scene.laws or not scene.is_thrown:
+        if not scene.is_thrown:
             return None
         components = [theta[name] for name in SPACE[: scene.num_axes]]
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Along the path, of object 1."""
-        if self.name not in scene.laws or scene.is_thrown:
+        if scene.is_thrown:
             return None
         return scene.only(theta[PATH[0]], 0)
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """The speed of a throw and its angle over the horizontal; the speed at a launcher."""
-        if self.name not in scene.laws or not scene.is_thrown:
+        if not scene.is_thrown:
             return {}
         x, y, *z = (theta[name] for name in SPACE[: scene.num_axes])
         xp = x.__array_namespace__()

@@ -13,8 +13,6 @@ Source: Newton, Principia, laws of motion, scholium (1687); Walton (1993), in: P
 flow (the impulse along the wall).
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta, Walls
 from galileo_jax.model.parameters import Normal, Parameter, Uniform
 
@@ -22,15 +20,13 @@ END_SD_M = 0.003  # as well as a rail's face is measured, or marked in a picture
 ENDS = ("from", "to")
 
 
-class StraightWalls(Effect):
+class StraightWalls(Effect, where=lambda scene: "walls" in scene.laws):
     """All declared walls: one restitution, one grip, and where exactly each of them is."""
 
-    name: ClassVar[str] = "walls"
+    name = "walls"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Restitution and grip of all walls; of each how far either end is off, to its left."""
-        if self.name not in scene.laws:
-            return ()
         place = Normal(0.0, END_SD_M)
         return (
             Parameter("wall_restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
@@ -42,10 +38,8 @@ class StraightWalls(Effect):
             ),
         )
 
-    def walls(self, theta: Theta, scene: Surroundings) -> Walls | None:
+    def walls(self, theta: Theta, scene: Surroundings) -> Walls:
         """The walls, as measured."""
-        if self.name not in scene.laws:
-            return None
         restitution = theta["wall_restitution"]
         xp = restitution.__array_namespace__()
         found = []

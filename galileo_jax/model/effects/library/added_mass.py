@@ -14,8 +14,6 @@ Introduction to Fluid Dynamics (1967), section 6.8.
 Confused with: scale_error, frame_rate: each of them acts like another gravity; rod_mass.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.air import undeclared_odds
 from galileo_jax.model.effects.effect import (
     PENDULUM,
@@ -38,16 +36,19 @@ LIQUID_PRIOR = LogNormal(median=0.2, sd=0.7)
 LIFT = 2.0  # what is displaced over what a sphere carries along
 
 
+def _shows_mass(scene: Surroundings) -> bool:
+    """Whether gravity pulls at the mass, and nothing else hides it."""
+    return not scene.has_surface and Spring.name not in scene.laws
+
+
 @register
-class AddedMass(Effect):
+class AddedMass(Effect, where=_shows_mass):
     """Fluid that the object carries along and displaces."""
 
-    name: ClassVar[str] = "added_mass"
+    name = "added_mass"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The fluid's share; none on a surface or a spring, whose masses do not show."""
-        if not _has_place(scene):
-            return ()
         prior = LIQUID_PRIOR if Liquid.name in scene.laws else PRIOR
         if self.name in scene.expected:
             prior = LongTailed(*scene.expected[self.name])
@@ -62,7 +63,7 @@ class AddedMass(Effect):
 
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """The lift, on a straight path and on a pendulum's circle."""
-        if not _has_place(scene) or Liquid.name in scene.laws or scene.is_thrown:
+        if Liquid.name in scene.laws or scene.is_thrown:
             return None
         lift = (LIFT * theta["added_mass"] * theta["m1"] * scene.gravity)[..., None]
         if PENDULUM not in scene.laws:
@@ -76,7 +77,7 @@ class AddedMass(Effect):
 
     def push(self, theta: Theta, scene: Surroundings) -> Push | None:
         """The lift of what flies, and the weight that its inertia does not share."""
-        if not _has_place(scene) or not scene.is_thrown:
+        if not scene.is_thrown:
             return None
         # The engine adds gravity to forces over the inertia: what is carried along weighs nothing.
         upward = (LIFT + 1.0) * theta["added_mass"] * theta["m1"] * scene.gravity
@@ -87,10 +88,6 @@ class AddedMass(Effect):
 
         return lift
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
         """The fluid's that comes along."""
-        return theta["added_mass"][..., None] if _has_place(scene) else None
-
-
-def _has_place(scene: Surroundings) -> bool:
-    return not scene.has_surface and Spring.name not in scene.laws
+        return theta["added_mass"][..., None]

@@ -10,8 +10,6 @@ Confused with: viscous_drag where speeds span less than a factor of two or so; a
 friction k where they hardly change.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.air import expected_odds
 from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -26,7 +24,7 @@ FALL_PRIOR = LogNormal(median=0.003, sd=1.5)
 class AirDrag(Effect):
     """Air drag on all objects, quadratic in the speed."""
 
-    name: ClassVar[str] = "air_drag"
+    name = "air_drag"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant c."""

@@ -9,8 +9,6 @@ Source: Squire (1986), Pendulum damping, Am. J. Phys. 54, 984.
 Confused with: viscous_drag in a clip of a few swings of nearly the same size.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     PENDULUM,
     Array,
@@ -27,21 +25,17 @@ PRIOR = LogNormal(median=0.005, sd=1.0)
 
 
 @register
-class BearingFriction(Effect):
+class BearingFriction(Effect, where=lambda scene: PENDULUM in scene.laws):
     """Dry friction in a pendulum's bearing."""
 
-    name: ClassVar[str] = "bearing_friction"
+    name = "bearing_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient k; none but for a pendulum."""
-        if PENDULUM not in scene.laws:
-            return ()
         return (Parameter("bearing_friction", "1", PRIOR, 0.0, "effect", 0.1),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficient."""
-        if PENDULUM not in scene.laws:
-            return None
         own = theta["bearing_friction"][..., None]
 
         def law(state: State, k: Array) -> Array:

@@ -9,7 +9,6 @@ in the picture tells; `vertical_sd_deg` allows for it in every model.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -18,20 +17,22 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, math.radians(2.0))
 
 
+def _shows_gravity(scene: Surroundings) -> bool:
+    """Whether there is a picture's vertical, and it is taken at its word."""
+    return scene.moves_in_plane and scene.num_axes == 2 and ANGLE not in scene.expected
+
+
 @register
-class CameraRoll(Effect):
+class CameraRoll(Effect, where=_shows_gravity):
     """The camera was rolled about its line of sight."""
 
-    name: ClassVar[str] = "camera_roll"
+    name = "camera_roll"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The roll; none but in the plane of a picture whose vertical is taken at its word."""
-        is_asked = scene.moves_in_plane and scene.num_axes == 2 and ANGLE not in scene.expected
-        return (Parameter("camera_roll", "rad", PRIOR, 0.0, "effect", 0.05),) if is_asked else ()
+        return (Parameter("camera_roll", "rad", PRIOR, 0.0, "effect", 0.05),)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
         """Of gravity in the plane."""
-        if not self.parameters(scene):
-            return None
         forward = theta["camera_roll"]
         return forward, 0.0 * forward

@@ -13,8 +13,6 @@ Ramp and table together tell them apart by 1 - cos a only, which is less than wh
 changes; a body at rest, or one that comes back up, does better.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     Array,
     Effect,
@@ -35,7 +33,7 @@ LEVELNESS_PRIOR = Normal(0.5, 0.5)  # along the path or level: both one sd from 
 class ConstantForce(Effect):
     """A steady force on object 1."""
 
-    name: ClassVar[str] = "constant_force"
+    name = "constant_force"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The force, and before a foot how level it is on the ramp."""

@@ -11,8 +11,6 @@ Confused with: scale_error (both act like another gravity, g (1 + s) against g (
 rolling; on one slope k1 and ramp_angle.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -24,7 +22,7 @@ PRIOR = Normal(0.0, 0.07)
 class FrameRate(Effect):
     """The declared frame rate is wrong."""
 
-    name: ClassVar[str] = "frame_rate"
+    name = "frame_rate"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error r of times; no rollout depends on it."""

@@ -11,8 +11,6 @@ Confused with: surface_friction where the strip begins at the foot and is long;
 magnetic_brake where the speed hardly changes inside.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.effects.zone import share_inside, zone_parameters
@@ -22,22 +20,18 @@ PRIOR = Normal(0.0, 0.2)
 
 
 @register
-class FrictionPatch(Effect):
+class FrictionPatch(Effect, where=lambda scene: scene.has_surface):
     """A strip of the way with another friction coefficient."""
 
-    name: ClassVar[str] = "friction_patch"
+    name = "friction_patch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher it is there, and the zone; none in a fall."""
-        if not scene.has_surface:
-            return ()
         strength = Parameter("friction_patch", "1", PRIOR, 0.0, "effect", 0.05)
         return (strength, *zone_parameters(self.name, scene))
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not scene.has_surface:
-            return None
         rougher = theta["friction_patch"]
         rougher = scene.only(rougher, 0) if scene.is_level else rougher[..., None]
 

@@ -9,8 +9,6 @@ Confused with: a release before the first frame (release_instant), where the fir
 are missing.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -19,17 +17,15 @@ PRIOR = LogNormal(median=0.3, sd=1.0)
 
 
 @register
-class InitialPush(Effect):
+class InitialPush(Effect, where=lambda scene: not scene.starts_moving):
     """Object 1 is pushed at the release."""
 
-    name: ClassVar[str] = "initial_push"
+    name = "initial_push"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The speed; none of what moves already when it is first seen."""
-        if scene.starts_moving:
-            return ()
         return (Parameter("initial_push", "m/s", PRIOR, 0.0, "effect", 0.1, per_clip=True),)
 
-    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array:
         """The speed, of object 1."""
-        return None if scene.starts_moving else scene.only(theta["initial_push"], 0)
+        return scene.only(theta["initial_push"], 0)

@@ -11,8 +11,6 @@ Confused with: friction_patch where the speed hardly changes inside; viscous_dra
 zone is the whole path.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.effects.zone import share_inside, zone_parameters
@@ -22,22 +20,18 @@ PRIOR = LogNormal(median=1.0, sd=1.2)
 
 
 @register
-class MagneticBrake(Effect):
+class MagneticBrake(Effect, where=lambda scene: scene.has_surface):
     """A zone in which object 1 is braked in proportion to its speed."""
 
-    name: ClassVar[str] = "magnetic_brake"
+    name = "magnetic_brake"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant b, and the zone; none in a fall."""
-        if not scene.has_surface:
-            return ()
         strength = Parameter("magnetic_brake", "kg/s", PRIOR, 0.0, "effect", 0.1)
         return (strength, *zone_parameters(self.name, scene))
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force -b v inside."""
-        if not scene.has_surface:
-            return None
         constant = scene.only(theta["magnetic_brake"], 0)
 
         def brake(state: State):

@@ -16,7 +16,6 @@ steady backspin lifts almost evenly.
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.effect import SPIN, Array, Effect, Push, Surroundings, Theta
@@ -30,15 +29,13 @@ SLOW_M_S, LEAST_RAD_S = 1e-3, 1e-3  # at rest S has no value, and without spin n
 
 
 @register
-class Magnus(Effect):
+class Magnus(Effect, where=lambda scene: scene.moves_in_plane):
     """Lift on a spinning ball in flight."""
 
-    name: ClassVar[str] = "magnus"
+    name = "magnus"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The spin, known or not, and the lift per spin; none but in a flight."""
-        if not scene.moves_in_plane:
-            return ()
         found = []
         for name, axis in _spins(scene):
             known = scene.expected.get(f"{SPIN}_{axis}")
@@ -47,10 +44,8 @@ class Magnus(Effect):
         lift = Parameter(LIFT, "1", LIFT_PRIOR, LIFT_PRIOR.median, "effect", 0.1)
         return (*found, lift)
 
-    def push(self, theta: Theta, scene: Surroundings) -> Push | None:
+    def push(self, theta: Theta, scene: Surroundings) -> Push:
         """The force across the velocity."""
-        if not scene.moves_in_plane:
-            return None
         radius = scene.half_height_m[0]
         size = theta[LIFT] * (0.5 * AIR_KG_M3 * math.pi * radius**3)
         spin = [theta[name] for name, _ in _spins(scene)]

@@ -13,8 +13,6 @@ Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. 
 Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -22,26 +20,27 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
 
 
+def _can_meet(scene: Surroundings) -> bool:
+    """Whether pucks have each other, or a wall, to meet."""
+    return scene.is_level and (len(scene.names) > 1 or len(scene.walls_m) > 0)
+
+
 @register
-class OvalRim(Effect):
+class OvalRim(Effect, where=_can_meet):
     """How far from round pucks are that are seen from above."""
 
-    name: ClassVar[str] = "oval_rim"
+    name = "oval_rim"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two of every puck; none of what is not seen from above, or has nothing to meet."""
-        if not scene.is_level or (len(scene.names) < 2 and not len(scene.walls_m)):
-            return ()
         return tuple(
             Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
             for i in range(len(scene.names))
             for name in _names(i)
         )
 
-    def oval(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def oval(self, theta: Theta, scene: Surroundings) -> Array:
         """Shares of the radii."""
-        if not self.parameters(scene):
-            return None
         rows = [[theta[name] for name in _names(i)] for i in range(len(scene.names))]
         xp = rows[0][0].__array_namespace__()
         return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)

@@ -10,7 +10,6 @@ The direction of travel in the picture and friction on the table tell them apart
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -19,22 +18,22 @@ from galileo_jax.model.parameters import Normal, Parameter
 PRIOR = Normal(0.0, math.radians(2.0))
 
 
+def _has_ramp(scene: Surroundings) -> bool:
+    """Whether an object is on a ramp."""
+    return scene.has_surface and (any(scene.comes_down) or not scene.has_table)
+
+
 @register
-class RampAngle(Effect):
+class RampAngle(Effect, where=_has_ramp):
     """The declared angle of the ramp is wrong."""
 
-    name: ClassVar[str] = "ramp_angle"
+    name = "ramp_angle"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much steeper the ramp is; none where nothing is on it, or in a fall."""
-        is_empty = scene.has_table and not any(scene.comes_down)
-        if is_empty or not scene.has_surface:
-            return ()
         return (Parameter("ramp_angle", "rad", PRIOR, 0.0, "effect", 0.05),)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
         """Of the ramp alone."""
-        if not self.parameters(scene):
-            return None
         steeper = theta["ramp_angle"]
         return steeper, 0.0 * steeper

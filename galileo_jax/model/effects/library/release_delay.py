@@ -10,8 +10,6 @@ Source: kinematics; Brown and Cox (2009), Innovative uses of video analysis, Phy
 Confused with: static_friction (a late start); initial_push of the opposite sign.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -20,17 +18,15 @@ PRIOR = LogNormal(median=0.15, sd=1.0)
 
 
 @register
-class ReleaseDelay(Effect):
+class ReleaseDelay(Effect, where=lambda scene: not scene.starts_moving):
     """Object 1 is released later than in the first frame."""
 
-    name: ClassVar[str] = "release_delay"
+    name = "release_delay"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The delay; no rollout depends on it. None where nothing is let go."""
-        if scene.starts_moving:
-            return ()
         return (Parameter("release_delay", "s", PRIOR, 0.0, "effect", step=None, per_clip=True),)
 
     def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
         """The time since the true release."""
-        return time_s if scene.starts_moving else time_s - theta["release_delay"]
+        return time_s - theta["release_delay"]

@@ -9,25 +9,21 @@ Source: Newton, Principia, laws of motion, scholium (1687); Stronge, Impact Mech
 Confused with: the mass ratio, where only object 2 is seen after the hit.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Parameter, Uniform
 
 
 @register
-class Restitution(Effect):
+class Restitution(Effect, where=lambda scene: len(scene.names) > 1):
     """Objects bounce when they collide."""
 
-    name: ClassVar[str] = "restitution"
+    name = "restitution"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient e; none where there is nothing to hit."""
-        if len(scene.names) < 2:
-            return ()
         return (Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "effect", 0.1),)
 
-    def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def restitution(self, theta: Theta, scene: Surroundings) -> Array:
         """The coefficient."""
-        return theta["restitution"] if self.parameters(scene) else None
+        return theta["restitution"]

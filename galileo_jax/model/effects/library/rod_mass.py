@@ -8,8 +8,6 @@ Source: Taylor, Classical Mechanics (2005), section 10.2 (a rod about its end: M
 Confused with: scale_error, frame_rate: each of them acts like another gravity.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     PENDULUM,
     Array,
@@ -27,21 +25,17 @@ PRIOR = LogNormal(median=0.3, sd=0.7)
 
 
 @register
-class RodMass(Effect):
+class RodMass(Effect, where=lambda scene: PENDULUM in scene.laws):
     """The rod of a pendulum has a mass."""
 
-    name: ClassVar[str] = "rod_mass"
+    name = "rod_mass"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The ratio of the masses; none but for a pendulum."""
-        if PENDULUM not in scene.laws:
-            return ()
         return (Parameter("rod_mass", "1", PRIOR, 0.0, "effect", 0.1),)
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The rod's weight, at its middle."""
-        if PENDULUM not in scene.laws:
-            return None
         weight = (0.5 * theta["rod_mass"] * theta["m1"] * scene.gravity)[..., None]
         length = theta[LENGTH][..., None]
 
@@ -50,6 +44,6 @@ class RodMass(Effect):
 
         return pull
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
         """The rod's."""
-        return theta["rod_mass"][..., None] / 3 if PENDULUM in scene.laws else None
+        return theta["rod_mass"][..., None] / 3

@@ -11,36 +11,20 @@ Confused with: frame_rate (both act like another gravity, g (1 + s) against g (1
 rolling; on one slope k1 and ramp_angle.
 """
 
-from typing import ClassVar
-
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.registry import register
-from galileo_jax.model.effects.scaled import scaled, unscaled
+from galileo_jax.model.effects.scaled import Scaled
 from galileo_jax.model.parameters import Normal, Parameter
 
 PRIOR = Normal(0.0, 0.07)
 
 
 @register
-class ScaleError(Effect):
+class ScaleError(Scaled, where=lambda scene: scene.is_scale_known):
     """The declared scale is wrong."""
 
-    name: ClassVar[str] = "scale_error"
+    name = "scale_error"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error s; none where the scale is itself unknown (pixel_scale)."""
-        if not scene.is_scale_known:
-            return ()
         return (Parameter("scale_error", "1", PRIOR, 0.0, "effect", 0.05),)
-
-    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The true starts."""
-        if not self.parameters(scene):
-            return path_m
-        return unscaled(path_m, theta["scale_error"])
-
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres as the declared scale shows them."""
-        if not self.parameters(scene):
-            return position_m
-        return scaled(position_m, theta["scale_error"], scene)

@@ -11,8 +11,6 @@ Source: Hooke, De potentia restitutiva (1678).
 Confused with: constant_force and k1 on a short path; air_drag in part (both grow on the way).
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import (
     Array,
     Effect,
@@ -33,7 +31,7 @@ STRAIGHTNESS_PRIOR = Normal(0.5, 0.5)  # led round the foot or free: both one sd
 class SpringTether(Effect):
     """A spring pulls object 1 back to its start."""
 
-    name: ClassVar[str] = "spring_tether"
+    name = "spring_tether"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The stiffness K, and past a foot how straight it pulls."""

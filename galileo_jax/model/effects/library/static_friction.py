@@ -19,7 +19,6 @@ left, g cos a (tan a - k - s):
 """
 
 import math
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -32,15 +31,13 @@ LEAST_SHARE = 1e-3
 
 
 @register
-class StaticFriction(Effect):
+class StaticFriction(Effect, where=lambda scene: scene.has_surface):
     """Friction is larger at rest than in motion."""
 
-    name: ClassVar[str] = "static_friction"
+    name = "static_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The extra coefficient s; none in a fall."""
-        if not scene.has_surface:
-            return ()
         return (Parameter("static_friction", "1", PRIOR, 0.0, "effect", 0.1),)
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
@@ -49,7 +46,7 @@ class StaticFriction(Effect):
         What it competes with is not that some s is there, but that one is there that shows: the
         prior's share of these is no evidence against it.
         """
-        if not scene.has_surface or (scene.has_table and not scene.comes_down[0]):
+        if scene.has_table and not scene.comes_down[0]:
             return 1.0
         extra, angle = float(theta["static_friction"]), float(scene.angle_rad)
         most = math.tan(angle) - float(theta["k1"])
@@ -61,10 +58,8 @@ class StaticFriction(Effect):
         share = _share_below(most) - _share_below(least)
         return 1.0 / max(share, LEAST_SHARE) if least < extra < most else 1.0
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the speeds."""
-        if not scene.has_surface:
-            return None
         extra = theta["static_friction"][..., None]
 
         def law(state: State, k: Array) -> Array:

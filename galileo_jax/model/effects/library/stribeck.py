@@ -11,8 +11,6 @@ Confused with: a larger k where v_s is above all speeds; static_friction where i
 below them; constant_force and air_drag in part (they change the acceleration with speed too).
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -22,25 +20,21 @@ SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
 
 
 @register
-class Stribeck(Effect):
+class Stribeck(Effect, where=lambda scene: scene.has_surface):
     """Friction falls with the speed."""
 
-    name: ClassVar[str] = "stribeck"
+    name = "stribeck"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much more friction there is at low speed, and up to which; none in a fall."""
-        if not scene.has_surface:
-            return ()
         usual = SPEED_PRIOR.median  # means nothing while the strength is absent
         return (
             Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
             Parameter("stribeck_speed", "m/s", SPEED_PRIOR, usual, "effect", 0.1),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the speeds."""
-        if not scene.has_surface:
-            return None
         excess = theta["stribeck"][..., None]
         speed = theta["stribeck_speed"][..., None]
 

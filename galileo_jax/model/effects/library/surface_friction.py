@@ -6,8 +6,6 @@ Source: Amontons (1699); Coulomb (1785): the coefficient belongs to the pair of 
 Confused with: table_tilt; friction_patch from the foot on; in part constant_force.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import Normal, Parameter
@@ -16,21 +14,17 @@ PRIOR = Normal(0.0, 0.1)
 
 
 @register
-class SurfaceFriction(Effect):
+class SurfaceFriction(Effect, where=lambda scene: scene.has_table):
     """Object 1 has another friction coefficient on the table."""
 
-    name: ClassVar[str] = "surface_friction"
+    name = "surface_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much rougher the table is; none without a table."""
-        if not scene.has_table:
-            return ()
         return (Parameter("surface_friction", "1", PRIOR, 0.0, "effect", 0.05),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients at the places."""
-        if not self.parameters(scene):
-            return None
         rougher = scene.only(theta["surface_friction"], 0)
 
         def law(state: State, k: Array) -> Array:

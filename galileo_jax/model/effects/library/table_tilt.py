@@ -12,7 +12,6 @@ frictions on the table, where both objects move: only the direction in the pictu
 
 import math
 from dataclasses import replace
-from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -22,22 +21,20 @@ PRIOR = Normal(0.0, math.radians(1.5))
 
 
 @register
-class TableTilt(Effect):
+class TableTilt(Effect, where=lambda scene: scene.has_table or scene.is_level):
     """The table is not level."""
 
-    name: ClassVar[str] = "table_tilt"
+    name = "table_tilt"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The table's slope, from above both; none without a table."""
         tilt = Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05)
         if scene.is_level:
             return (tilt, replace(tilt, name="table_tilt_y"))
-        return (tilt,) if scene.has_table else ()
+        return (tilt,)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
         """Of the table alone."""
-        if not self.parameters(scene):
-            return None
         slope = theta["table_tilt"]
         if scene.is_level:
             return slope, theta["table_tilt_y"]

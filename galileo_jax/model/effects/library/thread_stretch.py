@@ -9,8 +9,6 @@ Source: Hooke, De potentia restitutiva (1678); Landau and Lifshitz, Mechanics (1
 Confused with: a longer thread where swings are small and nobody declared its length.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
@@ -19,17 +17,15 @@ PRIOR = LogNormal(median=0.01, sd=0.7)
 
 
 @register
-class ThreadStretch(Effect):
+class ThreadStretch(Effect, where=lambda scene: PENDULUM in scene.laws):
     """The thread of a pendulum stretches."""
 
-    name: ClassVar[str] = "thread_stretch"
+    name = "thread_stretch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The stretch by the weight; none but for a pendulum."""
-        if PENDULUM not in scene.laws:
-            return ()
         return (Parameter("thread_stretch", "m", PRIOR, 0.0, "effect", 0.1),)
 
-    def stretch(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def stretch(self, theta: Theta, scene: Surroundings) -> Array:
         """How far."""
-        return theta["thread_stretch"] if PENDULUM in scene.laws else None
+        return theta["thread_stretch"]

@@ -9,8 +9,6 @@ Source: Stokes, On the effect of the internal friction of fluids on the motion o
 Confused with: air_drag where speeds span little; magnetic_brake where its zone is the whole path.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.air import expected_odds
 from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
@@ -25,7 +23,7 @@ FALL_PRIOR = LogNormal(median=0.03, sd=1.5)
 class ViscousDrag(Effect):
     """Drag on all objects, linear in the speed."""
 
-    name: ClassVar[str] = "viscous_drag"
+    name = "viscous_drag"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant b."""

@@ -13,7 +13,7 @@ speed, -v^2 d'(q); the path in the picture is bent alike:
 Only where the path is clearly bent (`scene/board_path.py`), which gives the prior.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 from numpy.polynomial import legendre
 
@@ -27,10 +27,10 @@ MOST = 5  # of n
 NODES, WEIGHTS = legendre.leggauss(8)  # exact for polynomials of degree 15
 
 
-class BoardShape(Effect):
+class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
     """The slope's changes along the way, in each clip on its own."""
 
-    name: ClassVar[str] = "board_slope"
+    name = "board_slope"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The c_n, rad; none where the path is straight."""
@@ -41,13 +41,10 @@ class BoardShape(Effect):
             if name in scene.expected
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
         """What the true slope adds to the pull down the mean one."""
-        if LENGTH not in scene.expected:
-            return None
-        mass = scene.mass(theta)
-        xp = mass[0].__array_namespace__()
-        weight = xp.stack(mass, axis=-1) * xp.asarray(scene.gravity)[..., None]
+        weight = scene.weight(theta)
+        xp = weight.__array_namespace__()
         angle = xp.asarray(scene.angle_rad)
 
         def pull(state: State) -> Array:
@@ -56,10 +53,8 @@ class BoardShape(Effect):
 
         return pull
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """Coefficients as they act on a force across the board of m g cos(mean angle)."""
-        if LENGTH not in scene.expected:
-            return None
 
         def law(state: State, k: Array) -> Array:
             xp = k.__array_namespace__()
@@ -72,8 +67,6 @@ class BoardShape(Effect):
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres on the bent path, where the engine has them on a straight one."""
-        if LENGTH not in scene.expected:
-            return position_m
         xp = position_m.__array_namespace__()
         start = xp.asarray(scene.start_m)[:, :, None]
         angle = xp.asarray(scene.angle_rad)

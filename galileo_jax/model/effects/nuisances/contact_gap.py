@@ -1,7 +1,5 @@
 """Contact gap: bodies that touch a second time do so further apart than when they met."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import HalfNormal, Parameter
 
@@ -10,7 +8,7 @@ from galileo_jax.model.parameters import HalfNormal, Parameter
 PRIOR = HalfNormal(2e-3)
 
 
-class ContactGap(Effect):
+class ContactGap(Effect, where=lambda scene: len(scene.names) > 1 and not scene.is_level):
     """When friction brings bodies together again after a hit, they touch further apart.
 
     A hit presses them together by the better part of a millimetre, which nobody tells from a gap
@@ -19,14 +17,12 @@ class ContactGap(Effect):
     coefficients of friction.
     """
 
-    name: ClassVar[str] = "contact_gap"
+    name = "contact_gap"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much further, m; none where there is nothing to hit."""
-        if len(scene.names) < 2 or scene.is_level:
-            return ()
         return (Parameter("contact_gap", "m", PRIOR, 0.0, "nuisance", 0.2),)
 
-    def overlap(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def overlap(self, theta: Theta, scene: Surroundings) -> Array:
         """How much further."""
-        return theta["contact_gap"] if self.parameters(scene) else None
+        return theta["contact_gap"]

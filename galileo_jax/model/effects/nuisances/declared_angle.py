@@ -1,12 +1,10 @@
 """Declared angle: read off a picture or a protractor, it is known to so and so many tenths."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 
-class DeclaredAngle(Effect):
+class DeclaredAngle(Effect, where=lambda scene: ANGLE in scene.expected):
     """The ramp is steeper than declared by some `ramp_angle_sd_deg`, in each clip on its own.
 
     Clips at several angles tell friction and scale by the differences of the angles, and no
@@ -14,18 +12,14 @@ class DeclaredAngle(Effect):
     picture's vertical (`vertical_sd_deg`).
     """
 
-    name: ClassVar[str] = ANGLE
+    name = ANGLE
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much steeper, rad; none where the angle is taken at its word."""
-        if self.name not in scene.expected:
-            return ()
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "rad", prior, 0.0, "nuisance", 0.1),)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
         """Of the ramp alone."""
-        if self.name not in scene.expected:
-            return None
         steeper = theta[self.name]
         return steeper, 0.0 * steeper

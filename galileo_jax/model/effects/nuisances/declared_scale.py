@@ -1,33 +1,19 @@
 """Declared scale: read off a picture, it is as good as the two pixels it was read from."""
 
-from typing import ClassVar
-
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.scaled import scaled, unscaled
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.scaled import Scaled
 from galileo_jax.model.parameters import Normal, Parameter
 
 
-class DeclaredScale(Effect):
+class DeclaredScale(Scaled, where=lambda scene: "declared_scale" in scene.expected):
     """Measured lengths are true ones times 1 + s, with s of the size `pixels_per_metre_sd` tells.
 
     As the effect `scale_error`, which is for scales that are wrong by more than anybody said.
     """
 
-    name: ClassVar[str] = "declared_scale"
+    name = "declared_scale"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The relative error s; none where the scale is taken at its word, or unknown."""
-        if self.name not in scene.expected:
-            return ()
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "1", prior, 0.0, "nuisance", 0.1),)
-
-    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The true starts."""
-        return unscaled(path_m, theta[self.name]) if self.name in scene.expected else path_m
-
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres as the declared scale shows them."""
-        if self.name not in scene.expected:
-            return position_m
-        return scaled(position_m, theta[self.name], scene)

@@ -1,14 +1,12 @@
 """Foot transition: how much speed a real edge keeps at the foot of the ramp."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 SD = 0.05
 
 
-class FootTransition(Effect):
+class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.comes_down)):
     """A factor on the speed where the path bends.
 
         v+ = f v- max(0, cos a - k sin a)
@@ -17,14 +15,12 @@ class FootTransition(Effect):
     MuJoCo and Bullet keep 1 to 4 % less, depending on angle and size, and so does a real edge.
     """
 
-    name: ClassVar[str] = "foot_transition"
+    name = "foot_transition"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The factor on the speed."""
-        if not (scene.has_table and any(scene.comes_down)):
-            return ()
         return (Parameter("foot_transition", "1", Normal(1.0, SD), 1.0, "nuisance", 0.1),)
 
-    def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def foot(self, theta: Theta, scene: Surroundings) -> Array:
         """The factor."""
-        return theta["foot_transition"] if self.parameters(scene) else None
+        return theta["foot_transition"]

@@ -1,7 +1,5 @@
 """Impact restitution: no real impact is perfectly plastic."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import HalfNormal, Parameter
 
@@ -10,21 +8,19 @@ from galileo_jax.model.parameters import HalfNormal, Parameter
 PRIOR = HalfNormal(0.04)
 
 
-class ImpactRestitution(Effect):
+class ImpactRestitution(Effect, where=lambda scene: len(scene.names) > 1 and not scene.is_level):
     """A small coefficient of restitution between the objects.
 
     Without it a rebound of a few per cent, which every body shows, is taken for a difference
     of friction or mass.
     """
 
-    name: ClassVar[str] = "impact_restitution"
+    name = "impact_restitution"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient; none where there is nothing to hit."""
-        if len(scene.names) < 2 or scene.is_level:
-            return ()
         return (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 
-    def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def restitution(self, theta: Theta, scene: Surroundings) -> Array:
         """The coefficient of restitution."""
-        return theta["impact_restitution"] if self.parameters(scene) else None
+        return theta["impact_restitution"]

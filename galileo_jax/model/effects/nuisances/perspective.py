@@ -1,12 +1,10 @@
 """Perspective: who films a high fall from the ground looks up, and the scale changes on the way."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import FALL_LENGTH, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 
-class Perspective(Effect):
+class Perspective(Effect, where=lambda scene: "perspective" in scene.expected):
     """The picture grows along a fall by `exp(-p)` at its top to `exp(p)` at its end.
 
         seen = h w / (w + (1 - w) exp(p)),    w = fallen / h
@@ -20,19 +18,15 @@ class Perspective(Effect):
     seen by a tilted camera).
     """
 
-    name: ClassVar[str] = "perspective"
+    name = "perspective"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much the scale changes; none where a fall is low enough for a level camera."""
-        if self.name not in scene.expected:
-            return ()
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "1", prior, 0.0, "nuisance", step=None),)
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres as the pitched camera shows them."""
-        if not self.parameters(scene):
-            return position_m
         xp = position_m.__array_namespace__()
         length, _ = scene.expected[FALL_LENGTH]
         y = position_m[:, 1]

@@ -1,33 +1,27 @@
 """Pixel scale: how many pixels a metre is, where nobody declared it."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Parameter
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
 
 
-class PixelScale(Effect):
+class PixelScale(Effect, where=lambda scene: not (scene.is_scale_known or scene.is_level)):
     """Measured lengths are true ones times pixels_per_metre / nominal scale.
 
     A frictionless fall tells the scale from gravity; on one slope only
     scale * (sin a - k cos a) shows, and neither it nor k can be determined.
     """
 
-    name: ClassVar[str] = "pixel_scale"
+    name = "pixel_scale"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The scale, px/m; none where it is declared, or lengths are in radii of a puck."""
-        if scene.is_scale_known or scene.is_level:
-            return ()
         prior = LogNormal(NOMINAL_SCALE_PX_PER_M, 1.0)
         nominal = NOMINAL_SCALE_PX_PER_M
         return (Parameter("pixels_per_metre", "px/m", prior, nominal, "main", step=None),)
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres in nominal metres, about object 1's start (the picture's origin)."""
-        if scene.is_scale_known or scene.is_level:
-            return position_m
         xp = position_m.__array_namespace__()
         origin = xp.asarray(scene.start_m[0])[:, None]
         factor = theta["pixels_per_metre"] / NOMINAL_SCALE_PX_PER_M

@@ -1,7 +1,5 @@
 """Release instant: the object is let go between two frames, not on one."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
@@ -12,7 +10,7 @@ class ReleaseInstant(Effect):
     What moves already when it is first seen has its clock's zero there.
     """
 
-    name: ClassVar[str] = "release_instant"
+    name = "release_instant"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The instant of the release after the first frame, s; none where nothing is let go."""

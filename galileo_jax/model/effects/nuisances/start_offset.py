@@ -1,26 +1,22 @@
 """Start offset: each object starts a few millimetres from where it was marked."""
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import ORIGIN, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 SD_M = 0.003  # a point set by hand, sizes declared to a millimetre
 
 
-class StartOffset(Effect):
+class StartOffset(Effect, where=lambda scene: scene.has_table):
     """Moves each start along the object's path, downhill positive.
 
     For object 1 it is the distance to the foot, for the others the gap before they are hit. A
     foot that is known no better than `origin_sd_px` shifts all of them.
     """
 
-    name: ClassVar[str] = "start_offset"
+    name = "start_offset"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """One per object, m."""
-        if not scene.has_table:
-            return ()
         _, origin_sd_m = scene.expected.get(ORIGIN, (0.0, 0.0))
         sd_m = (SD_M**2 + origin_sd_m**2) ** 0.5
         return tuple(
@@ -30,7 +26,5 @@ class StartOffset(Effect):
 
     def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """Moves every centre along its surface."""
-        if not self.parameters(scene):
-            return path_m
         offsets = [theta[f"start_offset_{name}"] for name in scene.names]
         return path_m + offsets[0].__array_namespace__().stack(offsets, axis=-1)

@@ -10,24 +10,20 @@ Source: four runs of one block on one board (docs/explanation/real_data.md); Gel
 Data Analysis Using Regression and Multilevel/Hierarchical Models, ch. 12.
 """
 
-from typing import ClassVar
-
 from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 
 SPREAD, SPREAD_FACTOR = 0.03, 1.386  # median, and the standard deviation of its logarithm
 
 
-class TrialFriction(Effect):
+class TrialFriction(Effect, where=lambda scene: scene.has_surface):
     """A factor on the friction of each object, of each trial another."""
 
-    name: ClassVar[str] = "trial_friction"
-    spread: ClassVar[str] = "friction_spread"
+    name = "trial_friction"
+    spread = "friction_spread"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The spread, which trials share, and each object's deviation; none without a surface."""
-        if not scene.has_surface:
-            return ()
         between = LogNormal(SPREAD, SPREAD_FACTOR)
         return (
             Parameter(self.spread, "1", between, 0.0, "latent", 0.2),
@@ -37,10 +33,8 @@ class TrialFriction(Effect):
             ),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
         """The coefficients of this trial."""
-        if not self.parameters(scene):
-            return None
         deviation = [theta[f"trial_friction_{i + 1}"] for i in range(len(scene.names))]
         xp = deviation[0].__array_namespace__()
         factor = xp.exp(theta[self.spread][..., None] * xp.stack(deviation, axis=-1))

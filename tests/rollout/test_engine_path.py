@@ -10,8 +10,8 @@ import pytest
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
-from galileo_jax.model.parameters import forward, inverse
-from galileo_jax.rollout.engine_rigid import EngineRigid, roll_out
+from galileo_jax.model.parameters import PriorTable, inverse
+from galileo_jax.rollout.engine_path import EnginePath, roll_out
 from galileo_jax.rollout.motion import LEAST_FRICTION
 from galileo_jax.rollout.rollout import JUMP_M_S2, at_times
 from galileo_jax.rollout.trajectory import Trajectory
@@ -36,7 +36,7 @@ SMOOTH = replace(HIT, friction=(LEAST_FRICTION, LEAST_FRICTION))
 def simulate(experiment, duration_s, effects: tuple[Effect, ...] = (), **given):
     """Centres and velocities of one rollout, its times, and its model."""
     model = replace(make_model(experiment, duration_s), effects=effects)
-    position, velocity = EngineRigid(model).simulate(make_theta(model, experiment, given)[None])
+    position, velocity = EnginePath(model).simulate(make_theta(model, experiment, given)[None])
     times = np.arange(position.shape[-1]) * model.record_dt_s
     return position[0], velocity[0], times
 
@@ -131,7 +131,7 @@ def test_derivatives_are_those_of_the_motion():
         model, HIT, {"impact_restitution": 0.05, "contact_gap": 3e-4, "drag": 0.05, "stribeck": 0.3}
     )
     z = inverse(model.parameters, jnp.asarray(theta))
-    engine = EngineRigid(model)
+    engine = EnginePath(model)
     # No frame within the steps' reach of the foot or the hit, where a difference sees both
     # sides and the derivative one.
     speed = np.asarray(rolled(engine, z).velocity_m_s)
@@ -154,8 +154,8 @@ def test_derivatives_are_those_of_the_motion():
 def test_absent_nuisances_are_not_there():
     model = make_model(HIT, 1.2)
     bare = Model(model.scene, model.duration_s, nuisances=())
-    found = EngineRigid(model).simulate(make_theta(model, HIT)[None])
-    wanted = EngineRigid(bare).simulate(make_theta(bare, HIT)[None])
+    found = EnginePath(model).simulate(make_theta(model, HIT)[None])
+    wanted = EnginePath(bare).simulate(make_theta(bare, HIT)[None])
     assert (found[0] == wanted[0]).all() and (found[1] == wanted[1]).all()
 
 
@@ -170,7 +170,7 @@ def test_absent_effects_are_not_there(effect):
 
 def test_a_result_does_not_depend_on_its_batch():
     model = make_model(HIT, 1.2)
-    engine, theta = EngineRigid(model), make_theta(model, HIT)
+    engine, theta = EnginePath(model), make_theta(model, HIT)
     rng = np.random.default_rng(0)
     batch = theta * (1 + 0.1 * rng.uniform(-1, 1, (70, len(theta))))
     together = engine.simulate(batch)[0]
@@ -180,7 +180,7 @@ def test_a_result_does_not_depend_on_its_batch():
 
 def test_bad_parameters_spoil_only_their_own_rollout():
     model = make_model(HIT, 1.2)
-    engine, theta = EngineRigid(model), np.tile(make_theta(model, HIT), (3, 1))
+    engine, theta = EnginePath(model), np.tile(make_theta(model, HIT), (3, 1))
     theta[1, 0] = np.nan
     position, velocity = engine.simulate(theta)
     assert np.isnan(position[1]).any() and np.isnan(velocity[1]).any()
@@ -316,7 +316,9 @@ def test_at_times_between_records(seed):
 def test_parameters_outside_jit_and_inside_are_one_path():
     model = make_model(HIT, 0.5)
     z = inverse(model.parameters, jnp.asarray(make_theta(model, HIT)))
-    engine = EngineRigid(model)
-    by_call, _ = engine.simulate(np.asarray(forward(model.parameters, jnp.asarray(z)))[None])
+    engine = EnginePath(model)
+    by_call, _ = engine.simulate(
+        np.asarray(PriorTable.of(model.parameters).forward(jnp.asarray(z)))[None]
+    )
     traced = jax.jit(lambda z: rolled(engine, z).position_m)(z)
     assert np.asarray(traced) == pytest.approx(by_call[0], abs=CLOSED_FORM_ATOL)

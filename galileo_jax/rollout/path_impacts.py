@@ -6,8 +6,9 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.rollout.events import PLASTIC_M_S
 from galileo_jax.rollout.motion import Dynamics, state_at
-from galileo_jax.rollout.rigid_bodies import (
+from galileo_jax.rollout.path_bodies import (
     TOUCH_M,
     Bodies,
     Number,
@@ -16,8 +17,6 @@ from galileo_jax.rollout.rigid_bodies import (
     rolls,
     with_link,
 )
-
-PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 
 
 def past_foot(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.events import reaches_s
 from galileo_jax.rollout.motion import Dynamics
-from galileo_jax.rollout.rigid_bodies import (
+from galileo_jax.rollout.path_bodies import (
     Bodies,
     Links,
     Number,
@@ -59,59 +59,67 @@ def accelerations(
     drive = law.drive(at.state(at.speed_m_s, time_s, scene))
     brake = law.brake(at.state(at.slip_m_s, time_s, scene))
     direction = [jnp.sign(slip) for slip in bodies.slip_m_s]
-    sticks = [one == 0 for one in direction]
-    pull = [drive[i] - direction[i] * brake[i] for i in range(count)]
-    inertia = [law.inertia[i] for i in range(count)]
-    rolling = [i for i in range(count) if rolls(scene, i)]
-    rest = [
-        jnp.zeros_like(pull[i]) if i in rolling else jnp.where(sticks[i], brake[i], 0.0)
-        for i in range(count)
-    ]
-    turning = {i: 1 / law.rim[i] for i in rolling}  # the inertia that rolling adds
+    forces = _Forces(
+        [drive[i] - direction[i] * brake[i] for i in range(count)],
+        [brake[i] for i in range(count)],
+        [one == 0 for one in direction],
+        [law.inertia[i] for i in range(count)],
+        {i: 1 / law.rim[i] for i in range(count) if rolls(scene, i)},
+    )
+    links = apart(count)
+    a, slips = forces.move(links)
+    for _ in range(count - 1):
+        for i in range(count - 1):
+            links = with_link(links, i, touches[i] & (a[i] > a[i + 1]))
+            a, slips = forces.move(links)
+    rim = [jnp.zeros_like(one) for one in a]
+    for i in forces.turning:
+        turned = (direction[i] + slips[i]) * brake[i] * law.rim[i]
+        rim[i] = jnp.where(forces.sticks[i] & (slips[i] == 0), a[i], turned)
+    return Accelerations(tuple(a), tuple(rim))
 
-    def each(links: Links) -> tuple[list[Number], dict[int, Number]]:
-        """Accelerations, and the way those that should roll slip all the same."""
+
+class _Forces(NamedTuple):
+    """What acts on each body: pull and brake, N; whether it sticks; kg; what rolling adds, kg."""
+
+    pull: list[Number]
+    brake: list[Number]
+    sticks: list[jax.Array]
+    inertia: list[Number]
+    turning: dict[int, Number]
+
+    def move(self, links: Links) -> tuple[list[Number], dict[int, Number]]:
+        """Accelerations of groups, and the way those that should roll slip all the same."""
+        pull, brake, sticks, inertia, turning = self
+        objects = range(len(pull))
+        rest = [
+            jnp.zeros_like(pull[i]) if i in turning else jnp.where(sticks[i], brake[i], 0.0)
+            for i in objects
+        ]
         pulls, holds = of_group(pull, links), of_group(rest, links)
         left = [
             force - jnp.clip(force, -held, held) for force, held in zip(pulls, holds, strict=True)
         ]
         masses = of_group(inertia, links)
-        slips = {i: jnp.zeros_like(direction[i]) for i in rolling}
+        slips = {i: jnp.zeros_like(pull[i]) for i in turning}
 
         def with_grip() -> list[Number]:
-            grips = {i: sticks[i] & (slips[i] == 0) for i in rolling}
-            rubs = [
-                slips[i] * brake[i] if i in rolling else jnp.zeros_like(pull[i])
-                for i in range(count)
-            ]
-            turns = [
-                jnp.where(grips[i], turning[i], 0.0) if i in rolling else jnp.zeros_like(pull[i])
-                for i in range(count)
-            ]
+            rubs, turns = ([jnp.zeros_like(one) for one in pull] for _ in range(2))
+            for i, slip in slips.items():
+                rubs[i] = slip * brake[i]
+                turns[i] = jnp.where(sticks[i] & (slip == 0), turning[i], 0.0)
             rubbed, turned = of_group(rubs, links), of_group(turns, links)
-            return [(left[i] - rubbed[i]) / (masses[i] + turned[i]) for i in range(count)]
+            return [(left[i] - rubbed[i]) / (masses[i] + turned[i]) for i in objects]
 
-        if not rolling:
+        if not turning:
             return [force / mass for force, mass in zip(left, masses, strict=True)], slips
         a = with_grip()
-        for _ in rolling:
-            for i in rolling:
+        for _ in turning:
+            for i in turning:
                 fails = sticks[i] & (jnp.abs(a[i]) * turning[i] > brake[i])
                 slips[i] = jnp.where(fails, jnp.sign(left[i]), slips[i])
             a = with_grip()
         return a, slips
-
-    links = apart(count)
-    a, slips = each(links)
-    for _ in range(count - 1):
-        for i in range(count - 1):
-            links = with_link(links, i, touches[i] & (a[i] > a[i + 1]))
-            a, slips = each(links)
-    rim = [jnp.zeros_like(one) for one in a]
-    for i in rolling:
-        turned = (direction[i] + slips[i]) * brake[i] * law.rim[i]
-        rim[i] = jnp.where(sticks[i] & (slips[i] == 0), a[i], turned)
-    return Accelerations(tuple(a), tuple(rim))
 
 
 class Events(NamedTuple):

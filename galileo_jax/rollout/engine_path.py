@@ -21,11 +21,19 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import PART, Motion, System, Task, rolled_out, step_by_events
+from galileo_jax.rollout.events import (
+    PART,
+    PLASTIC_M_S,
+    Motion,
+    System,
+    Task,
+    of_task,
+    step_by_events,
+)
 from galileo_jax.rollout.motion import Dynamics, to_plane
-from galileo_jax.rollout.rigid_bodies import Bodies, rolls
-from galileo_jax.rollout.rigid_impacts import PLASTIC_M_S, after_hits, past_foot
-from galileo_jax.rollout.rigid_motion import (
+from galileo_jax.rollout.path_bodies import Bodies, rolls
+from galileo_jax.rollout.path_impacts import after_hits, past_foot
+from galileo_jax.rollout.path_motion import (
     PAST_FOOT_M,
     Accelerations,
     accelerations,
@@ -36,8 +44,13 @@ from galileo_jax.rollout.rigid_motion import (
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
 
 
-@rolled_out
-def roll_out(task: Task) -> System:
+@of_task
+def roll_out(task: Task) -> Motion:
+    """Bodies on their path."""
+    return task.motion(path_system(task))
+
+
+def path_system(task: Task) -> System:
     """Bodies on their path."""
     law, scene, dt_s = task.law(), task.scene, task.dt_s
     objects = range(len(scene.names))
@@ -136,7 +149,7 @@ def _to_next_event(
     return Bodies(tuple(q), tuple(v), tuple(u)), t, a
 
 
-class EngineRigid(EngineJax):
+class EnginePath(EngineJax):
     """Bodies on their path, see the module."""
 
     roll_out = staticmethod(roll_out)
