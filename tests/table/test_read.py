@@ -346,3 +346,25 @@ def test_how_sure_a_program_was_counts_whatever_it_is_called(title: str, tmp_pat
 
 def test_a_column_beside_that_is_no_sureness_is_not_taken_for_one(tmp_path: Path) -> None:
     assert np.isfinite(read(tmp_path, unsure("area", 0.3)).position).all()
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "time;temperature",
+        "Zeit (s);Temp. 1",
+        "t;U (V)",
+        "t (s);I (mA)",
+        "t;Druck",
+        "Datum;Temperatur",
+    ],
+)
+def test_a_column_of_another_kind_is_no_way(titles: str, tmp_path: Path) -> None:
+    """Nor is it asked about; a title that nobody knows may be the way in some language."""
+    rows = "\n".join(f"{n / 2};{20 + 30 * 0.9**n:.2f}" for n in range(30))
+    path = tmp_path / "a.csv"
+    path.write_text(f"{titles}\n{rows}\n")
+    with pytest.raises(InputError, match="which columns are places"):
+        read_table(path)
+    path.write_text(f"{titles.split(';')[0]};matka (m)\n{rows}\n")
+    assert read_table(path).axes == ("line",)
