@@ -91,3 +91,36 @@ def test_a_fit_holds_the_mean_friction(tmp_path, uneven):
     assert entry["q025"] < friction < entry["q975"]
     assert fit.result["probability_imperfect"] > 0.95
     assert fit.result["imperfections"]["friction_roughness"]["ordinary"] == (uneven < 0.05)
+
+
+def thrown(folder, scale_error, slow_m, seed):
+    """Fifteen places of a throw with slow errors, read off with a scale that is wrong."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(15) / 15
+    apart = (t[:, None] - t) / 0.12
+    slow = slow_m * np.linalg.cholesky(np.exp(-(apart**2) / 2) + 1e-6 * np.eye(len(t)))
+    rows = [t]
+    for place in (1.6 * t, 4.6 * t - 4.905 * t**2):
+        errors = slow @ rng.standard_normal(15) + 3e-4 * rng.standard_normal(15)
+        rows.append((1 + scale_error) * place + errors)
+    head = "t (s),x (m),y (m)"
+    table = np.column_stack(rows)
+    np.savetxt(folder / "toss.csv", table, delimiter=",", header=head, comments="", fmt="%.4f")
+    (folder / "toss.yaml").write_text(
+        "track: toss.csv\nscenario: flight\nobjects: [{name: ball, shape: sphere}]\n"
+    )
+    return folder / "toss.yaml"
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path, seed):
+    """Of usual sizes, but 30 and 110 times less probable than a scale 3 % off."""
+    found = gx.diagnose(thrown(tmp_path, 0.03, 0.001, seed), seed=0)
+    assert found.verdict.status == "ambiguous"
+    assert set(found.verdict.effects) == {"scale_error", "frame_rate"}
+    assert not found.document["adequate"]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_slow_errors_alone_are_no_effect(tmp_path, seed):
+    assert gx.diagnose(thrown(tmp_path, 0.0, 0.002, seed), seed=0).verdict.status == "none"
