@@ -18,6 +18,8 @@ MANY_DIGITS = 100.0
 """Units in the last place of a step: what moves so far does not stand at one place by chance."""
 COPY, PLACE = 0.5, 0.25
 """Of a step: a copied place is farther from where the path leads, and its original is nearer."""
+GOES_ON = 0.75
+"""Of a step: a body goes on so far in a row, or it begins, ends or turns there by itself."""
 
 
 def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
@@ -144,8 +146,11 @@ def _copied(clock: np.ndarray, values: np.ndarray, row: int, least: float) -> in
         return None
     pair = np.array([row, row + 1])
     through = np.polyfit(clock[beside] - clock[row], values[beside], 2)
-    off = np.abs(np.polyval(through, clock[pair] - clock[row]) - values[pair])
+    at = clock[pair] - clock[row]
+    off = np.abs(np.polyval(through, at) - values[pair])
+    speed = abs(float(np.polyval(np.polyder(through), at[off.argmin()])))
     step = float(np.abs(np.diff(values[beside])).min())
-    if step < least or off.max() < COPY * step or off.min() > PLACE * step:
+    is_moving = step > least and speed * at[1] > GOES_ON * step
+    if not is_moving or off.max() < COPY * step or off.min() > PLACE * step:
         return None
     return int(pair[off.argmax()])

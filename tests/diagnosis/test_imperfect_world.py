@@ -4,10 +4,20 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.api.clips import load
+from galileo_jax.api.diagnose import with_library
+from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.imperfect_world import imperfect_world
+from galileo_jax.diagnosis.stakes import VerdictStakes
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.measurement.measure import measure
 from galileo_jax.report.diagnosis_text import roughness
+from galileo_jax.search.hypothesis import Hypothesis
+from tests.precision import in_64_bit
 
 ANGLE_DEG, FRICTION, LENGTH_M = 25.0, 0.25, 0.01
 FPS, SUBSTEPS, NOISE_M, WAY_M = 100.0, 50, 1e-4, 0.9
+DRAG_PER_M = 0.0064  # of the air on a baseball
 YAML = """
 track: slide.csv
 scenario: incline
@@ -124,3 +134,35 @@ def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path
 @pytest.mark.parametrize("seed", [0, 1])
 def test_slow_errors_alone_are_no_effect(tmp_path, seed):
     assert gx.diagnose(thrown(tmp_path, 0.0, 0.002, seed), seed=0).verdict.status == "none"
+
+
+@in_64_bit()
+def test_an_effect_is_expected_at_its_strength_beside_imperfections(tmp_path):
+    """Slow errors look like more drag in an exact world than beside errors."""
+    t = np.arange(40) / 15
+    rng = np.random.default_rng(0)
+    slow = 0.25 * np.linalg.cholesky(
+        np.exp(-(((t[:, None] - t) / 0.6) ** 2) / 2) + 1e-6 * np.eye(40)
+    )
+    fallen = np.log(np.cosh(t * np.sqrt(9.81 * DRAG_PER_M))) / DRAG_PER_M
+    height = 35 - fallen + slow @ rng.standard_normal(40) + 0.04 * rng.standard_normal(40)
+    head = "t (s),y (m)"
+    rows = np.column_stack([t, height])
+    np.savetxt(tmp_path / "ball.csv", rows, delimiter=",", header=head, comments="", fmt="%.4f")
+    (tmp_path / "ball.yaml").write_text(
+        "track: ball.csv\nscenario: fall\n"
+        "objects: [{name: ball, shape: sphere, size_m: [0.036], mass_kg: 0.14}]\n"
+    )
+    seen = measure(load(tmp_path / "ball.yaml"))
+    trials = with_library([seen.clip], [seen.observation], "rigid", None)
+    fitter = GradientFitter(trials)
+    base = Hypothesis((), fitter.fit(0, effects=()))
+    own = Hypothesis(("air_drag",), fitter.fit(0, effects=("air_drag",)))
+    prior = VerdictStakes(trials, False).log_prior(own)
+    exact = Candidate(own.effects, own, {}, 0.0, own.evidence_over(base), prior, 0.5, None, ())
+    world = imperfect_world(trials, base, 3.0, 0)
+    assert world is not None
+    (found,) = world.with_candidates(trials, [exact], 0).table
+    stakes = VerdictStakes(found.hypothesis.of(trials), False)
+    assert found.log_prior == pytest.approx(stakes.log_prior(found.hypothesis))
+    assert abs(found.log_prior - exact.log_prior) > 0.1

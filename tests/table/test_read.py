@@ -398,4 +398,12 @@ def test_equal_places_are_no_copies_where_a_path_turns_or_digits_are_few(tmp_pat
     rows = "\n".join(f"{a:.4f},{1.5 * a:.9f},{-4.905 * a**2:.9f}" for a in t)
     path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
     assert np.isfinite(read_table(path).position).all()  # the vertex lies between two rows
+    rows = "\n".join(f"{a:.4f},{1.5 * a:.9f},0" for a in t)
+    path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    assert np.isfinite(read_table(path).position).all()  # it moves along x alone
+    for moment in np.linspace(0.0, 0.09, 10):  # it is let go
+        fallen = 2.0 - 4.905 * np.maximum(t - t[0] - moment, 0.0) ** 2
+        rows = "\n".join(f"{a:.4f},{b:.9f}" for a, b in zip(t, fallen, strict=True))
+        path.write_text(f"t (s),y (m)\n{rows}\n")
+        assert np.isfinite(read_table(path).position).all()
     assert np.isfinite(_falling({11: 10}, 2, tmp_path).position).all()
