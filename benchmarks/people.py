@@ -150,8 +150,8 @@ def num_typed(folder: Path, name: str, declared: Mapping[str, Any]) -> int | Non
         if points:
             texts["points"] = f"{points[0][0]} {points[0][1]}"
         asked = answered(known, texts).questions
-        usual = [list(known.things)[int(one.default) - 1] for one in asked
-                 if one.key == "points" and (one.default or "").isdigit()]  # fmt: skip
+        told = next((one.default or "" for one in asked if one.key == "points"), "")
+        usual = [list(known.things)[int(told) - 1]] if told.isdigit() else []
     if usual and points and math.dist(usual[0], points[0]) < NEAR_PX:
         texts.pop("points")
     return sum(

@@ -32,7 +32,8 @@ def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]
         return observation, []
     mask = observation.mask[:, kept]
     position = np.where(observation.mask[:, None], observation.position_m, 0.0) @ weights.T
-    covariance = observation.covariance_m2 @ (weights**2).T
+    stated = np.where(observation.mask[:, None, None], observation.covariance_m2, 0.0)
+    covariance = np.where(mask[:, None, None], stated @ (weights**2).T, np.nan)
     modes, turned = observation.modes_m, observation.turned_rad
     averaged = replace(
         observation,

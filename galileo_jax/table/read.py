@@ -83,9 +83,9 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
         unit = unit or "px"
     is_counted = times is None and frames is None
     frames = np.arange(places.shape[-1], dtype=float) if is_counted else frames
-    if not ids:
-        clock = frames if times is None else times
-        places, said = without_copies(path, clock, places, resolution, lines)
+    rows = times if times is not None else frames
+    if rows is not None and not ids:
+        places, said = without_copies(path, rows, places, resolution, lines)
         warnings += said
     return TrackTable(
         names=names,
