@@ -17,7 +17,7 @@ MOST_DOTS, MOST_CORNERS = 36, 150
 SIZE_IN = (2.5, 1.65)
 DISTRUST = "See where it fails"
 NAMES = {"k1": "friction", "mass_ratio": "ratio of the masses", "gravity": "g",
-         "launch_speed": "launch speed", "pixels_per_metre": "scale",
+         "thread_length": "length", "launch_speed": "launch speed", "pixels_per_metre": "scale",
          "deceleration1": "deceleration 1", "deceleration2": "deceleration 2"}  # fmt: skip
 VERDICTS = {"wrong": "**wrong**", "wrong, not trusted": "**wrong**, and says so",
             "refused, rightly": "right: refused"}  # fmt: skip

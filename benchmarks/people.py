@@ -28,6 +28,9 @@ import yaml
 
 from benchmarks import gallery
 from benchmarks.journal import Journal
+from galileo_jax.api.questions import NUMBERS, answered
+from galileo_jax.api.understand import understand
+from galileo_jax.runtime.errors import InputError
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
 PACKAGE = Path(__file__).parents[1]
@@ -35,6 +38,7 @@ JOURNAL = PACKAGE / "build" / "people.jsonl"
 CASES = Path(__file__).with_suffix(".yaml")
 TOO_LONG_S = 300.0  # of a processor
 DISTRUST = "See where it fails|No known effect explains the data"
+NEAR_PX = 15.0  # two marks of one thing
 IMPLIED = ("track", "video", "objects")  # keys that say nothing but which file
 
 
@@ -93,7 +97,8 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
     row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in wanted if name in values},
            "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
-           "keys": _num_keys(declared), "sentence": document.get("sentence", ""),
+           "keys": _num_keys(declared), "typed": num_typed(path.parent, case["file"], declared),
+           "sentence": document.get("sentence", ""),
            "motions": motions,
            "said": said.replace(scratch, "").strip().splitlines()[-25:]}  # fmt: skip
     return row | {"judged": judged(case, row, values, said)}
@@ -121,15 +126,49 @@ def judged(
     return "wrong" if is_trusted else "wrong, not trusted"
 
 
+def num_typed(folder: Path, name: str, declared: Mapping[str, Any]) -> int | None:
+    """Answers that `galileo FILE` needs and Enter does not give, of a file that a person made.
+
+    Args:
+      folder: in which the clip's file is.
+      name: of the case's file; None is returned where no person made it, or it cannot be read.
+      declared: what is right to answer.
+    """
+    if not name.removeprefix("../").startswith("real/"):
+        return None
+    with tempfile.TemporaryDirectory() as alone:
+        source = folder / (declared.get("track") or declared["video"])
+        try:
+            known = understand(Path(shutil.copy(source, alone)))
+        except InputError:
+            return None
+        points = [item["point_px"] for item in declared["objects"] if "point_px" in item]
+        texts = {key: f"{declared[key]:g}" for key in NUMBERS if declared.get(key) is not None}
+        texts |= {key: declared[key] for key in ("scenario", "track_units") if key in declared}
+        if declared.get("pixels_per_metre"):
+            texts["pixels_per_metre"] = f"{declared['pixels_per_metre']:g} px"
+        if points:
+            texts["points"] = f"{points[0][0]} {points[0][1]}"
+        asked = answered(known, texts).questions
+        told = next((one.default or "" for one in asked if one.key == "points"), "")
+        usual = [list(known.things)[int(told) - 1]] if told.isdigit() else []
+    if usual and points and math.dist(usual[0], points[0]) < NEAR_PX:
+        texts.pop("points")
+    return sum(
+        one.default is None or texts.get(one.key, one.default) != one.default for one in asked
+    )
+
+
 def markdown(rows: list[dict[str, Any]]) -> list[str]:
     """The rows as a table for the docs."""
-    lines = ["| File | What it is | Right | Found, 95 % interval | Judged | s | Keys |",
-             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    lines = ["| File | What it is | Right | Found, 95 % interval | Judged | s | Keys | Typed |",
+             "|---|---|---|---|---|---|---|---|"]  # fmt: skip
     for row in rows:
         name = row["file"].removesuffix(".yaml").removesuffix(".wanted")
+        typed = "" if row.get("typed") is None else row["typed"]
         lines.append(
-            f"| `{name}` | {row['what'].removeprefix('real: ')} | {row['right']} | "
-            f"{_found(row)} | {row['judged']} | {row['wall_s']:.0f} | {row['keys']} |"
+            f"| `{name}` | {row['what'].removeprefix('real: ')} | {row['right']} | {_found(row)} | "
+            f"{row['judged']} | {row['wall_s']:.0f} | {row['keys']} | {typed} |"
         )
     return lines
 

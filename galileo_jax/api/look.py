@@ -37,7 +37,7 @@ class Look:
         return self.seen.yaml if self.seen else ""
 
     def summary(self) -> str:
-        """Lines to read: columns, time, gaps, what moves, the likely scenario, and a yaml."""
+        """Lines to read: columns, time, gaps, what moves, the likely scenario; a yaml."""
         if self.seen is None:
             return f"{self.path.name}: {self.film}"
         return "\n".join(_lines(self.seen))
@@ -117,5 +117,8 @@ def _lines(seen: Seen) -> list[str]:
     )
     lines.append(f"moves: {seen.names[0]} by {moved}")
     lines.append(f"likely scenario: {seen.scenario} ({seen.why})")
-    lines += ["", f"{seen.path.with_suffix('.yaml').name} would be:", ""]
+    beside = seen.path.with_suffix(".yaml")
+    if beside.exists():
+        return [*lines, f"declared: {beside.name}, which is there already"]
+    lines += ["", f"{beside.name} would be:", ""]
     return [*lines, *("  " + line for line in seen.yaml.splitlines())]

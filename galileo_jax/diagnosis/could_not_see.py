@@ -8,11 +8,12 @@ to about
 
 The first term is the gain, where the model without the effect takes d for larger noise in its n
 residuals; the next two are what the evidence charges for a strength that has z in its prior and is
-known to sd_z. The smallest s at which this is what the verdict asks for (`CONVINCING`) is the
-answer. It is an estimate without a fit: from slopes, taken again at the strength that they gave.
-Chance adds or takes away some nats in every single clip. Of effects that were hidden with just this
-strength, seven clips each, the log odds were on average 6.4 (air_drag) and 7.0 (viscous_drag) on a
-board, 2.2 +- 2.3 (air_drag) on a ramp with a table; 7 are asked for.
+known to sd_z. The smallest s at which this is what the verdict asks for (`CONVINCING`, beside
+imperfections `DECISIVE`) is the answer. It is an estimate without a fit: from slopes, taken again
+at the strength that they gave. Chance adds or takes away some nats in every single clip. Of effects
+that were hidden with just this strength, seven clips each, the log odds were on average 6.4
+(air_drag) and 7.0 (viscous_drag) on a board, 2.2 +- 2.3 (air_drag) on a ramp with a table, where 7
+are asked for.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.verdict import CONVINCING
+from galileo_jax.diagnosis.verdict import CONVINCING, DECISIVE
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import force_constants, is_any_weighed
@@ -56,7 +57,7 @@ def could_not_see(
 
 
 def smallest_shown(
-    power: float, num_left: float, prior: Prior, absent: float, log_prior: float
+    power: float, num_left: float, prior: Prior, absent: float, log_prior: float, needed: float
 ) -> float | None:
     """The smallest strength whose expected log odds convince; None where none does.
 
@@ -66,13 +67,14 @@ def smallest_shown(
       prior: of the strength.
       absent: at which the effect is not there.
       log_prior: of the effect, over that of the model without it.
+      needed: log odds that the verdict asks for.
     """
     strength = in_units(prior, PRIOR_Z)
     wide = np.gradient(strength, PRIOR_Z)  # d strength / dz
     sd_z = 1 / np.sqrt(1 + power * wide**2)
     gain = 0.5 * num_left * np.log1p(power * (strength - absent) ** 2 / num_left)
     odds = gain - 0.5 * PRIOR_Z**2 + np.log(sd_z) + log_prior
-    shown = np.abs(strength - absent)[odds >= CONVINCING]
+    shown = np.abs(strength - absent)[odds >= needed]
     return float(shown.min()) if shown.size else None
 
 
@@ -105,6 +107,7 @@ def _smallest(
     own = trials.model_parameters[where[0]]
     probes = probes.copy()
     num_left = max(fit.num_values - fit.num_used, 1.0)
+    needed = CONVINCING if fit.sizes is None else DECISIVE
     found: list[float | None] = [None] * len(probes)
     for _ in range(ROUNDS):
         _, power = slopes_along(trials, fit, probes)
@@ -112,7 +115,7 @@ def _smallest(
         # Where an effect is tried at no strength it shows by none.
         shown = np.divide(power, size**2, out=np.zeros_like(power), where=size != 0)
         for i, squared in enumerate(shown):
-            tried = float(squared), num_left, own.prior, own.absent, log_prior
+            tried = float(squared), num_left, own.prior, own.absent, log_prior, needed
             found[i] = smallest_shown(*tried)
             if (strength := found[i]) is not None:
                 probes[i, where] = own.absent + strength

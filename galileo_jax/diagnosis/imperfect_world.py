@@ -8,10 +8,20 @@ explains, imperfections no longer have to; so evidence with all sizes integrated
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.diagnosis import Candidate, Round
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
-from galileo_jax.diagnosis.verdict import CONVINCING, explains, ranked, rivals, to_compare
+from galileo_jax.diagnosis.stakes import odds_of
+from galileo_jax.diagnosis.verdict import (
+    CONVINCING,
+    explains,
+    num_expected,
+    ranked,
+    rivals,
+    to_compare,
+)
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
@@ -147,9 +157,14 @@ def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Cand
     if fit.sizes is None or fit.code is Code.FAILED:
         return None
     theta = world.trials.theta(fit.z, fit.free)
+    hypothesis = Hypothesis(candidate.effects, fit, world.trials)
+    # What the clip leads to expect depends on the strength, which is another beside imperfections.
+    before, now = odds_of(own, candidate.hypothesis), odds_of(world.trials, hypothesis)
     return replace(
         candidate,
-        hypothesis=Hypothesis(candidate.effects, fit, world.trials),
+        hypothesis=hypothesis,
+        log_prior=candidate.log_prior + float(np.sum(np.log(now)) - np.sum(np.log(before))),
+        num_expected=num_expected(now),
         error=error_of(world.trials, theta, fit.num_fitted, fit.pull),
         log_evidence=fit.log_evidence - base.fit.log_evidence,
         p_value=None,

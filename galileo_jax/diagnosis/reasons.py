@@ -481,19 +481,24 @@ def constant_by_data(named: Candidate, form: Form, low: float, high: float) -> R
     )
 
 
-def imperfections_explain(comparison: Comparison) -> Reason:
+def imperfections_explain(comparison: Comparison, needed: float) -> Reason:
     """Imperfections leave nothing but noise without any effect.
 
     Args:
       comparison: of the model without effects, with imperfections.
+      needed: log odds at which an effect beside them would be believed.
     """
     size = f"larger than usual: {', '.join(comparison.unusual)}" if comparison.unusual else "usual"
     return Reason(
         "imperfections_explain",
         f"With imperfections, of sizes that are {size}, the data do not contradict the model "
         f"without effects ({p_equals(comparison.p_value)}), and no effect beside them is "
-        "convincing.",
-        {"p_value": comparison.p_value, "unusual": ", ".join(comparison.unusual) or None},
+        f"{times_text(needed)} as probable.",
+        {
+            "p_value": comparison.p_value,
+            "unusual": ", ".join(comparison.unusual) or None,
+            "least_log_odds": needed,
+        },
     )
 
 

@@ -105,10 +105,12 @@ def without_a_name(
 ) -> Verdict | None:
     """The verdict where no effect is needed in an imperfect world; None where one is.
 
-    None is missing where imperfections of usual sizes leave nothing but noise and no effect is
-    convincing beside them. The friction is uneven where it varies by more and no effect, with
-    imperfections of usual sizes, explains the data about as well; ambiguous where one does. A
-    formula has to be better than imperfections are. What would have to push is no friction.
+    None is missing where imperfections of usual sizes leave nothing but noise and no effect beside
+    them is ahead by `DECISIVE`: the exact model was contradicted, and that sizes found in the data
+    leave only noise speaks less for it than a test that it passes without them (`CONVINCING`). The
+    friction is uneven where it varies by more and no effect, with imperfections of usual sizes,
+    explains the data about as well; ambiguous where one does. A formula has to be better than
+    imperfections are. What would have to push is no friction.
 
     Args:
       comparison: of the model without effects, with imperfections.
@@ -119,11 +121,13 @@ def without_a_name(
         return None
     explaining = [c for c in candidates if explains(c)]
     lead = max((c.log_odds for c in explaining), default=-np.inf)
-    why = (reasons.imperfections_explain(comparison),)
+    if lead >= DECISIVE:
+        return None
+    why = (reasons.imperfections_explain(comparison, DECISIVE),)
     if not comparison.unusual:
-        return None if lead >= CONVINCING else Verdict("none", (), reasons=why)
+        return Verdict("none", (), reasons=why)
     name = AS_EFFECTS.get(comparison.unusual)
-    if name is None or lead >= DECISIVE or not is_friction:
+    if name is None or not is_friction:
         return None
     rivals = [c for c in explaining if not c.is_form and c.law is None and c.log_odds > -DECISIVE]
     if not rivals:

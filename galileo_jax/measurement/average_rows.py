@@ -32,7 +32,8 @@ def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]
         return observation, []
     mask = observation.mask[:, kept]
     position = np.where(observation.mask[:, None], observation.position_m, 0.0) @ weights.T
-    covariance = observation.covariance_m2 @ (weights**2).T
+    stated = np.where(observation.mask[:, None, None], observation.covariance_m2, 0.0)
+    covariance = np.where(mask[:, None, None], stated @ (weights**2).T, np.nan)
     across = observation.across[..., kept]  # no mean makes known what was not measured
     missing = UNMEASURED_SD_M**2 - np.einsum("oat,oabt,obt->ot", across, covariance, across)
     covariance += np.einsum("ot,oat,obt->oabt", missing, across, across)

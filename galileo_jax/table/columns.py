@@ -14,7 +14,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import clock_times
 from galileo_jax.table.heading import Heading
 from galileo_jax.table.numbers import Numbers, is_nothing, is_number, parse_columns
-from galileo_jax.table.titles import DERIVED, LENGTHS, Title
+from galileo_jax.table.titles import LENGTHS, Title, is_no_place
 from galileo_jax.table.track_table import MIN_LIKELIHOOD
 
 PLACES = ("x", "y", "z", "line", "angle")
@@ -44,9 +44,8 @@ class Columns:
 def with_roles(path: Path, heading: Heading, fps: float | None) -> Columns:
     """The columns with roles by their titles, or else by their numbers."""
     meanings = heading.meanings
-    if not any(one.role in PLACES for one in meanings):
-        meanings = tuple(one if one.role else replace(one, role="line") for one in meanings
-                         ) if _is_one_left(heading) else meanings  # fmt: skip
+    if not any(one.role in PLACES for one in meanings) and (way := _only_one_left(heading)):
+        meanings = tuple(replace(one, role="line") if one is way else one for one in meanings)
     asked = [n for n, one in enumerate(meanings) if one.role]
     has_clock = any(one.role in ("time", "frame") for one in meanings)
     has_place = any(one.role in PLACES for one in meanings)
@@ -76,21 +75,18 @@ def with_roles(path: Path, heading: Heading, fps: float | None) -> Columns:
 def _may_be_used(heading: Heading, n: int) -> bool:
     """Whether a column without a known title can be time or place: numbers, in no other unit."""
     unit = heading.meanings[n].unit
-    if heading.titles[n] and unit is None and _is_derived(heading.titles[n]):
+    if unit is None and is_no_place(heading.titles[n]):
         return False
     cells = [row[n] for _, row in heading.body[:200] if n < len(row) and row[n]]
     return bool(cells) and all(is_number(cell) or is_nothing(cell) for cell in cells)
 
 
-def _is_derived(title: str) -> bool:
-    return any(word in DERIVED for word in title.lower().replace("_", " ").split())
-
-
-def _is_one_left(heading: Heading) -> bool:
+def _only_one_left(heading: Heading) -> Title | None:
+    """The only column that may be the way, where one is left; None where none or several are."""
     left = [
-        n for n, one in enumerate(heading.meanings) if not one.role and _may_be_used(heading, n)
+        one for n, one in enumerate(heading.meanings) if not one.role and _may_be_used(heading, n)
     ]
-    return len(left) == 1
+    return left[0] if len(left) == 1 else None
 
 
 def _is_even(numbers: Numbers) -> bool:

@@ -15,7 +15,12 @@ from galileo_jax.table.columns import PLACES, Columns, with_roles
 from galileo_jax.table.grid import read_grid
 from galileo_jax.table.heading import Heading, split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
-from galileo_jax.table.repeated import motion_starts, unrounded, without_repeats
+from galileo_jax.table.repeated import (
+    motion_starts,
+    unrounded,
+    without_copies,
+    without_repeats,
+)
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
 from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS
@@ -78,6 +83,10 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
         unit = unit or "px"
     is_counted = times is None and frames is None
     frames = np.arange(places.shape[-1], dtype=float) if is_counted else frames
+    rows = times if times is not None else frames
+    if rows is not None and not ids:
+        places, said = without_copies(path, rows, places, resolution, lines)
+        warnings += said
     return TrackTable(
         names=names,
         position=places,

@@ -1,4 +1,4 @@
-"""Rows with the same time, and times that begin anew: one motion after the other in one table."""
+"""Rows with the same time or a copied place, and times that begin anew: motions in one table."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +13,13 @@ MOST_STEPS = 3.0
 """From the first row of a motion to its second."""
 ROUNDED = 1.01
 """Units in the last place between times that were rounded up and down."""
+
+MANY_DIGITS = 100.0
+"""Units in the last place of a step: what moves so far does not stand at one place by chance."""
+COPY, PLACE = 0.5, 0.25
+"""Of a step: a copied place is farther from where the path leads, and its original is nearer."""
+GOES_ON = 0.75
+"""Of a step: a body goes on so far in a row, or it begins, ends or turns there by itself."""
 
 
 def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
@@ -91,3 +98,59 @@ def without_repeats(
     )
     said = f"{path}: line {first}: {int(repeats.sum())} times stand in several rows, {how}"
     return times[starts], mean, [said]
+
+
+def without_copies(
+    path: Path,
+    clock: np.ndarray,
+    places: np.ndarray,
+    resolution: Sequence[float],
+    lines: Sequence[int],
+) -> tuple[np.ndarray, list[str]]:
+    """Places `[object, axis, row]`, NaN where they were copied from a neighbour, and what was done.
+
+    A program that loses a body writes its last place once more, and one that begins late its first
+    place before. In a moving body's track a coordinate that is the same in two rows to the last of
+    many digits is such a copy where a parabola through three rows beside them leads to one of the
+    two and not to the other.
+
+    Args:
+      path: named in what is said.
+      clock: `[row]`, rising.
+      places: in any unit.
+      resolution: of each axis.
+      lines: of the rows in the file.
+    """
+    found = places.copy()
+    for body, axis, row in np.argwhere(np.diff(places, axis=-1) == 0):
+        copy = _copied(clock, places[body, axis], int(row), MANY_DIGITS * resolution[axis])
+        if copy is not None:
+            found[body, :, copy] = np.nan
+    rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
+    if not rows.size:
+        return places, []
+    listed = ", ".join(f"line {lines[row]}" for row in rows[:5])
+    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
+    said = (
+        f"{path}: {listed}{more}: the place of the row beside it, to the last digit, while it "
+        "moves: a copy, which counts as not seen"
+    )
+    return found, [said]
+
+
+def _copied(clock: np.ndarray, values: np.ndarray, row: int, least: float) -> int | None:
+    """Which of two equal rows is a copy of the other; None where neither is."""
+    after, before = np.arange(row + 2, row + 5), np.arange(row - 3, row)
+    beside = after if after[-1] < len(values) else before
+    if beside[0] < 0 or not np.isfinite(values[beside]).all():
+        return None
+    pair = np.array([row, row + 1])
+    through = np.polyfit(clock[beside] - clock[row], values[beside], 2)
+    at = clock[pair] - clock[row]
+    off = np.abs(np.polyval(through, at) - values[pair])
+    speed = abs(float(np.polyval(np.polyder(through), at[off.argmin()])))
+    step = float(np.abs(np.diff(values[beside])).min())
+    is_moving = step > least and speed * at[1] > GOES_ON * step
+    if not is_moving or off.max() < COPY * step or off.min() > PLACE * step:
+        return None
+    return int(pair[off.argmax()])

@@ -21,7 +21,9 @@ def _by_word(words_of: dict[Any, str]) -> dict[str, Any]:
 
 _LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"))
 WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
-FILLERS, DERIVED = (frozenset(_LISTS[key].split()) for key in ("fillers", "derived"))
+FILLERS, DERIVED, OTHER_UNITS = (
+    frozenset(_LISTS[key].split()) for key in ("fillers", "derived", "other_units")
+)
 SYMBOLS = frozenset("va")
 """Of quantities made from places; 'A X' is the place of A, and so is 'a x (cm)'."""
 
@@ -59,6 +61,13 @@ def unit_of(text: str) -> str | None:
     """A unit alone, in brackets or not; None: it is none."""
     word = text.strip().strip("()[]{}").strip().lower()
     return word if word in UNITS else None
+
+
+def is_no_place(text: str) -> bool:
+    """Whether a title says that a column is of another kind: 'Temp. 2', 'U (V)'."""
+    words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
+    is_derived = any(word.rstrip("0123456789") in DERIVED for word in words)
+    return is_derived or any(unit in OTHER_UNITS for unit in BRACKETS.findall(text))
 
 
 def title_of(text: str) -> Title:

@@ -54,3 +54,14 @@ def test_what_is_no_file_is_one_line(tmp_path: Path) -> None:
         look(tmp_path / "none.csv")
     with pytest.raises(InputError, match="a table or a film expected"):
         look(tmp_path)
+
+
+def test_a_yaml_that_is_there_is_named_and_no_other_is_proposed(tmp_path: Path, capsys) -> None:
+    path = write(tmp_path / "a.csv", "t (s);y (m)", T, 2 - 4.905 * T**2)
+    assert main(["look", str(path)]) in (None, 0)
+    assert "a.yaml would be" in capsys.readouterr().out
+    path.with_suffix(".yaml").write_text("track: a.csv\nscenario: flight\n")
+    assert main(["look", str(path)]) in (None, 0)
+    out = capsys.readouterr().out
+    assert "a.yaml, which is there already" in out
+    assert "would be" not in out and "objects:" not in out

@@ -4,10 +4,20 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.api.clips import load
+from galileo_jax.api.diagnose import with_library
+from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.imperfect_world import imperfect_world
+from galileo_jax.diagnosis.stakes import VerdictStakes
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.measurement.measure import measure
 from galileo_jax.report.diagnosis_text import roughness
+from galileo_jax.search.hypothesis import Hypothesis
+from tests.precision import in_64_bit
 
 ANGLE_DEG, FRICTION, LENGTH_M = 25.0, 0.25, 0.01
 FPS, SUBSTEPS, NOISE_M, WAY_M = 100.0, 50, 1e-4, 0.9
+DRAG_PER_M = 0.0064  # of the air on a baseball
 YAML = """
 track: slide.csv
 scenario: incline
@@ -91,3 +101,68 @@ def test_a_fit_holds_the_mean_friction(tmp_path, uneven):
     assert entry["q025"] < friction < entry["q975"]
     assert fit.result["probability_imperfect"] > 0.95
     assert fit.result["imperfections"]["friction_roughness"]["ordinary"] == (uneven < 0.05)
+
+
+def thrown(folder, scale_error, slow_m, seed):
+    """Fifteen places of a throw with slow errors, read off with a scale that is wrong."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(15) / 15
+    apart = (t[:, None] - t) / 0.12
+    slow = slow_m * np.linalg.cholesky(np.exp(-(apart**2) / 2) + 1e-6 * np.eye(len(t)))
+    rows = [t]
+    for place in (1.6 * t, 4.6 * t - 4.905 * t**2):
+        errors = slow @ rng.standard_normal(15) + 3e-4 * rng.standard_normal(15)
+        rows.append((1 + scale_error) * place + errors)
+    head = "t (s),x (m),y (m)"
+    table = np.column_stack(rows)
+    np.savetxt(folder / "toss.csv", table, delimiter=",", header=head, comments="", fmt="%.4f")
+    (folder / "toss.yaml").write_text(
+        "track: toss.csv\nscenario: flight\nobjects: [{name: ball, shape: sphere}]\n"
+    )
+    return folder / "toss.yaml"
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path, seed):
+    """Of usual sizes, but 30 and 110 times less probable than a scale 3 % off."""
+    found = gx.diagnose(thrown(tmp_path, 0.03, 0.001, seed), seed=0)
+    assert found.verdict.status == "ambiguous"
+    assert set(found.verdict.effects) == {"scale_error", "frame_rate"}
+    assert not found.document["adequate"]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_slow_errors_alone_are_no_effect(tmp_path, seed):
+    assert gx.diagnose(thrown(tmp_path, 0.0, 0.002, seed), seed=0).verdict.status == "none"
+
+
+@in_64_bit()
+def test_an_effect_is_expected_at_its_strength_beside_imperfections(tmp_path):
+    """Slow errors look like more drag in an exact world than beside errors."""
+    t = np.arange(40) / 15
+    rng = np.random.default_rng(0)
+    slow = 0.25 * np.linalg.cholesky(
+        np.exp(-(((t[:, None] - t) / 0.6) ** 2) / 2) + 1e-6 * np.eye(40)
+    )
+    fallen = np.log(np.cosh(t * np.sqrt(9.81 * DRAG_PER_M))) / DRAG_PER_M
+    height = 35 - fallen + slow @ rng.standard_normal(40) + 0.04 * rng.standard_normal(40)
+    head = "t (s),y (m)"
+    rows = np.column_stack([t, height])
+    np.savetxt(tmp_path / "ball.csv", rows, delimiter=",", header=head, comments="", fmt="%.4f")
+    (tmp_path / "ball.yaml").write_text(
+        "track: ball.csv\nscenario: fall\n"
+        "objects: [{name: ball, shape: sphere, size_m: [0.036], mass_kg: 0.14}]\n"
+    )
+    seen = measure(load(tmp_path / "ball.yaml"))
+    trials = with_library([seen.clip], [seen.observation], "rigid", None)
+    fitter = GradientFitter(trials)
+    base = Hypothesis((), fitter.fit(0, effects=()))
+    own = Hypothesis(("air_drag",), fitter.fit(0, effects=("air_drag",)))
+    prior = VerdictStakes(trials, False).log_prior(own)
+    exact = Candidate(own.effects, own, {}, 0.0, own.evidence_over(base), prior, 0.5, None, ())
+    world = imperfect_world(trials, base, 3.0, 0)
+    assert world is not None
+    (found,) = world.with_candidates(trials, [exact], 0).table
+    stakes = VerdictStakes(found.hypothesis.of(trials), False)
+    assert found.log_prior == pytest.approx(stakes.log_prior(found.hypothesis))
+    assert abs(found.log_prior - exact.log_prior) > 0.1

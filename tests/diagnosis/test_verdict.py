@@ -640,9 +640,9 @@ def test_a_single_effect_is_no_pair():
 @pytest.mark.parametrize(
     ("p_value", "unusual", "best", "status", "effects"),
     [
-        (0.01, (), 7 - EDGE, "none", ()),
+        (0.01, (), 3 - EDGE, "none", ()),
         (0.01 - EDGE, (), 0.0, None, ()),
-        (0.5, (), 7 + EDGE, None, ()),
+        (0.5, (), 3 + EDGE, None, ()),
         (0.5, ("friction_roughness",), -3 - EDGE, "named", ("uneven_friction",)),
         (0.5, ("friction_roughness",), -3 + EDGE, "ambiguous", ("air_drag", "uneven_friction")),
         (0.5, ("friction_roughness",), 3 - EDGE, "ambiguous", ("air_drag", "uneven_friction")),
@@ -651,7 +651,7 @@ def test_a_single_effect_is_no_pair():
         (0.5, ("friction_roughness", "lasting_error"), 0.0, None, ()),
     ],
 )
-def test_imperfections_explain_where_no_effect_beside_them_convinces(
+def test_imperfections_explain_where_no_effect_beside_them_is_ahead(
     p_value, unusual, best, status, effects
 ):
     """Of usual sizes: none; friction alone larger than usual: it has the name of an effect."""

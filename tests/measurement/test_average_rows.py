@@ -99,3 +99,18 @@ def test_a_short_track_stays_as_it_is():
     times = np.arange(MOST_ROWS) / 60
     observation = seen(swing(times), times)
     assert with_rows_averaged(observation) == (observation, [])
+
+
+def test_an_error_that_nobody_knows_of_a_row_that_was_not_seen_stays_there():
+    times = np.arange(1600) / 60
+    mask = np.ones((1, 1600), bool)
+    mask[0, [0, 800]] = False
+    whole = seen(swing(times), times)
+    position = np.where(mask[:, None], whole.position_m, np.nan)
+    covariance = np.where(mask[:, None, None], whole.covariance_m2, np.nan)
+    gappy = replace(whole, position_m=position, covariance_m2=covariance, mask=mask)
+    averaged, _ = with_rows_averaged(gappy)
+    assert len(averaged.times_s) < 1.2 * MOST_ROWS
+    is_known = np.isfinite(averaged.covariance_m2).all(axis=(1, 2))
+    assert (is_known == averaged.mask).all()
+    assert (np.isfinite(averaged.position_m).all(axis=1) == averaged.mask).all()

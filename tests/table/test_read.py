@@ -346,3 +346,64 @@ def test_how_sure_a_program_was_counts_whatever_it_is_called(title: str, tmp_pat
 
 def test_a_column_beside_that_is_no_sureness_is_not_taken_for_one(tmp_path: Path) -> None:
     assert np.isfinite(read(tmp_path, unsure("area", 0.3)).position).all()
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "time;temperature",
+        "Zeit (s);Temp. 1",
+        "t;U (V)",
+        "t (s);I (mA)",
+        "t;Druck",
+        "Datum;Temperatur",
+    ],
+)
+def test_a_column_of_another_kind_is_no_way(titles: str, tmp_path: Path) -> None:
+    """Nor is it asked about; a title that nobody knows may be the way in some language."""
+    rows = "\n".join(f"{n / 2};{20 + 30 * 0.9**n:.2f}" for n in range(30))
+    path = tmp_path / "a.csv"
+    path.write_text(f"{titles}\n{rows}\n")
+    with pytest.raises(InputError, match="which columns are places"):
+        read_table(path)
+    path.write_text(f"{titles.split(';')[0]};matka (m)\n{rows}\n")
+    assert read_table(path).axes == ("line",)
+
+
+def _falling(copies: dict[int, int], digits: int, folder: Path) -> TrackTable:
+    """A throw of 30 rows, in which rows have the height of others."""
+    t = np.arange(30) / 30
+    x, y = 1.5 * t, 1.0 + 4.0 * t - 4.905 * t**2
+    for copy, of in copies.items():
+        x[copy], y[copy] = x[of] + 1e-4, y[of]  # as a program that smooths x alone
+    path = folder / "a.csv"
+    rows = "\n".join(
+        f"{a:.4f},{b:.{digits}f},{c:.{digits}f}" for a, b, c in zip(t, x, y, strict=True)
+    )
+    path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    return read_table(path)
+
+
+@pytest.mark.parametrize("copies", [{0: 1}, {29: 28}, {0: 1, 29: 28}, {11: 10}])
+def test_a_copied_place_is_not_seen(copies, tmp_path: Path) -> None:
+    """At either end, as of programs that lose a body or find it late, and in a gap."""
+    table = _falling(copies, 9, tmp_path)
+    assert np.flatnonzero(np.isnan(table.position[0, 1])).tolist() == sorted(copies)
+    assert any("a copy" in one for one in table.warnings)
+
+
+def test_equal_places_are_no_copies_where_a_path_turns_or_digits_are_few(tmp_path: Path) -> None:
+    t = np.arange(-15.5, 15.5) / 30
+    path = tmp_path / "b.csv"
+    rows = "\n".join(f"{a:.4f},{1.5 * a:.9f},{-4.905 * a**2:.9f}" for a in t)
+    path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    assert np.isfinite(read_table(path).position).all()  # the vertex lies between two rows
+    rows = "\n".join(f"{a:.4f},{1.5 * a:.9f},0" for a in t)
+    path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    assert np.isfinite(read_table(path).position).all()  # it moves along x alone
+    for moment in np.linspace(0.0, 0.09, 10):  # it is let go
+        fallen = 2.0 - 4.905 * np.maximum(t - t[0] - moment, 0.0) ** 2
+        rows = "\n".join(f"{a:.4f},{b:.9f}" for a, b in zip(t, fallen, strict=True))
+        path.write_text(f"t (s),y (m)\n{rows}\n")
+        assert np.isfinite(read_table(path).position).all()
+    assert np.isfinite(_falling({11: 10}, 2, tmp_path).position).all()
