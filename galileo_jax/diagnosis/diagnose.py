@@ -113,8 +113,7 @@ def diagnose(
     """
     if is_given := add not in ("auto", "none"):
         trials.free([add])  # raises for unknown names
-    listener = _Listener(on_stage, on_round, on_candidate)
-    fitter = GradientFitter(trials)
+    listener, fitter = _Listener(on_stage, on_round, on_candidate), GradientFitter(trials)
     none, first = _without_effects(fitter, base, seed, listener)
     if not is_given and not is_any_moving(trials):
         still = Verdict("none", (), reasons=(reasons.nothing_moves(),))

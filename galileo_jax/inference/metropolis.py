@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -80,46 +80,63 @@ def metropolis_posterior(
         begin = scattered(valley, fit, residuals, seed, num_chains)
     else:
         begin = valley.straight(starts)
-    kernel, key = sampler_class(sampler), jax.random.key(seed)
-    density, watch = density_of(trials, fit), _watch(trials, fit)
-    dim = valley.root.shape[1]
     first, second = _parts(settings)
     total = settings.warmup_steps + settings.max_steps
-
-    def run(at: Coordinates, begin: np.ndarray, part: Settings, is_second: bool) -> Posterior:
-        before = total - part.warmup_steps - part.max_steps if is_second else 0
-
-        def report(state: Progress) -> None:
-            assert on_block is not None
-            on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
-
-        beside = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
-        mean, covariance = jnp.asarray(at.mean), jnp.asarray(at.covariance)
-        return sample(
-            jax.random.fold_in(key, 1) if is_second else key,
-            kernel.from_gaussian(mean, covariance),  # pyright: ignore
-            along(density, at.valley),
-            jnp.asarray(begin),
-            trials.names,
-            settings=part,
-            monitor=partial(watch, at.valley),
-            on_block=report if on_block else None,
-            checkpoint=beside if is_second else checkpoint,
-            identity=identity,
-        )
-
+    chains = _Chains(trials, fit, seed, sampler, total, checkpoint, identity, on_block)
+    dim = valley.root.shape[1]
     at = Coordinates(valley, np.zeros(dim), np.eye(dim))
-    posterior = run(at, begin, first, is_second=False)
+    posterior = chains.run(at, begin, first, is_second=False)
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     if second is not None and not posterior.is_converged:
         u = posterior.draws
         at = learned(valley, u[:, u.shape[1] // 2 :].reshape(-1, dim))
         last = u[:, -1]
         begin = last if at.valley is valley else at.valley.straight(valley(last))
-        posterior = run(at, begin, second, is_second=True)
+        posterior = chains.run(at, begin, second, is_second=True)
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda u: trials.theta(at.valley(u)), trials.names)
+
+
+@dataclass(frozen=True)
+class _Chains:
+    """What both runs have in common, as `metropolis_posterior` has it; `total`: steps of both."""
+
+    trials: JointProblem
+    fit: GradientFit
+    seed: int
+    sampler: str
+    total: int
+    checkpoint: Path | None
+    identity: str
+    on_block: Callable[[Progress], None] | None
+
+    def run(self, at: Coordinates, begin: np.ndarray, part: Settings, is_second: bool) -> Posterior:
+        """One of them, from `begin` in coordinates `at`."""
+        before = self.total - part.warmup_steps - part.max_steps if is_second else 0
+
+        def report(state: Progress) -> None:
+            assert self.on_block is not None
+            whole = replace(state, num_steps=before + state.num_steps, max_steps=self.total)
+            self.on_block(whole)
+
+        kernel, key = sampler_class(self.sampler), jax.random.key(self.seed)
+        file = self.checkpoint
+        if file is not None and is_second:
+            file = file.with_name(f"{file.name}.second")
+        mean, covariance = jnp.asarray(at.mean), jnp.asarray(at.covariance)
+        return sample(
+            jax.random.fold_in(key, 1) if is_second else key,
+            kernel.from_gaussian(mean, covariance),  # pyright: ignore
+            along(density_of(self.trials, self.fit), at.valley),
+            jnp.asarray(begin),
+            self.trials.names,
+            settings=part,
+            monitor=partial(_watch(self.trials, self.fit), at.valley),
+            on_block=report if self.on_block else None,
+            checkpoint=file,
+            identity=self.identity,
+        )
 
 
 def _watch(

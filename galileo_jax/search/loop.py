@@ -11,7 +11,7 @@ It ends when a round changes nothing on which the conclusion may hang.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,29 +30,13 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.moves import MOVES, Move
 from galileo_jax.search.score_tests import score_tests
 from galileo_jax.search.start import Start
-from galileo_jax.search.table import BASE, CHANGED_NATS, LEAST_AGREEING, Entry, Key, Table, ask
+from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Key, Table, ask
 
 MOST_ROUNDS = 4
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
 MOST_WITH_CARE = 6  # hypotheses whose every end is refined until it has settled
 MOST_REFINED = 24  # hypotheses of several effects in a round, those that come nearest
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the race may yet have the better of
-
-
-@dataclass(frozen=True)
-class _End:
-    """Where a start came to: a place to refine from."""
-
-    effects: tuple[str, ...]
-    z: np.ndarray
-    parent: Hypothesis | None
-    cost: float = np.nan
-    promise: float = np.nan  # the cost less what the width of the valley is worth, nats
-    num_agreeing: int = LEAST_AGREEING  # starts that ended in its valley
-
-    @property
-    def key(self) -> Key:
-        return frozenset(self.effects)
 
 
 def search(
@@ -110,7 +94,7 @@ def _round(
     first = _first_of_each(ends, min(known.values(), default=np.inf))
     scores = _scores(table, first)
 
-    def take(table: Table, end: _End, fit: GradientFit) -> Table:
+    def take(table: Table, end: Start, fit: GradientFit) -> Table:
         key = end.key
         old = table.entries.get(key)
         if old is None:
@@ -128,7 +112,7 @@ def _round(
     for end, fit in _refined_in_turn(table, [end for end in first if end.key != BASE]):
         table = take(table, end, fit)
     deciding = {BASE, *table.deciding()[:MOST_WITH_CARE]}
-    near = [_End(one.effects, one.z, one.parent) for one in starts if one.is_near]
+    near = [one for one in starts if one.is_near]
     # What was refined in its turn was so roughly: it goes on.
     rough = [
         replace(end, z=table.entries[end.key].hypothesis.fit.z[: len(end.z)])
@@ -145,9 +129,9 @@ def _round(
     return _weighed(table, on_entry)
 
 
-def _scores(table: Table, ends: Sequence[_End]) -> dict[Key, float]:
+def _scores(table: Table, ends: Sequence[Start]) -> dict[Key, float]:
     """How many standard deviations the slope of each new hypothesis' last effect explains."""
-    new: dict[Hypothesis, list[_End]] = {}
+    new: dict[Hypothesis, list[Start]] = {}
     for end in ends:
         if not end.effects or end.parent is None or end.key in table.entries:
             continue
@@ -160,7 +144,7 @@ def _scores(table: Table, ends: Sequence[_End]) -> dict[Key, float]:
     return scores
 
 
-def _raced(table: Table, starts: Sequence[Start], known: Mapping[Key, float]) -> list[_End]:
+def _raced(table: Table, starts: Sequence[Start], known: Mapping[Key, float]) -> list[Start]:
     """Where starts come to in a race, the best end of every valley of each hypothesis.
 
     Without those that are far behind, and those in valleys that are known; `known`: the costs of
@@ -188,7 +172,8 @@ def _raced(table: Table, starts: Sequence[Start], known: Mapping[Key, float]) ->
             if key in known and _is_no_news(table.entries[key], known[key], found, row):
                 continue
             at, promise = found.best.z[row], cost - volume[row]
-            ends.append(_End(start.effects, at, start.parent, cost, promise, num_agreeing))
+            end = replace(start, z=at, cost=cost, promise=promise, num_agreeing=num_agreeing)
+            ends.append(end)
     return ends
 
 
@@ -212,12 +197,12 @@ def _is_no_news(entry: Entry, known: float, found: Descended, row: int) -> bool:
     return bool(far.min() < SAME_VALLEY_NATS and cost > known - SAME_VALLEY_NATS)
 
 
-def _first_of_each(ends: Sequence[_End], lowest: float) -> list[_End]:
+def _first_of_each(ends: Sequence[Start], lowest: float) -> list[Start]:
     """The best end of each hypothesis, by promise; of several effects only what comes near.
 
     `lowest`: the least cost of the table's fits.
     """
-    best: dict[Key, _End] = {}
+    best: dict[Key, Start] = {}
     for end in sorted(ends, key=lambda end: end.cost):
         best.setdefault(end.key, end)
     lowest = min([lowest, *(end.cost for end in ends)])
@@ -227,7 +212,7 @@ def _first_of_each(ends: Sequence[_End], lowest: float) -> list[_End]:
     return sorted(chosen, key=lambda end: end.promise)
 
 
-def _refined_in_turn(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit]]:
+def _refined_in_turn(table: Table, ends: Sequence[Start]) -> list[tuple[Start, GradientFit]]:
     """Fits from ends, roughly, a few at a time, without those far behind others."""
     if not ends:
         return []
@@ -238,7 +223,7 @@ def _refined_in_turn(table: Table, ends: Sequence[_End]) -> list[tuple[_End, Gra
     return [(ends[row], fit) for row, fit in fits]
 
 
-def _refined(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit]]:
+def _refined(table: Table, ends: Sequence[Start]) -> list[tuple[Start, GradientFit]]:
     """Fits from ends, until they have settled; one for each valley."""
     if not ends:
         return []
@@ -249,7 +234,7 @@ def _refined(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit
     return [(ends[row], fit) for row, fit in fits.items()]
 
 
-def _points(table: Table, rows: Sequence[Start] | Sequence[_End]) -> tuple[np.ndarray, np.ndarray]:
+def _points(table: Table, rows: Sequence[Start]) -> tuple[np.ndarray, np.ndarray]:
     """Z of the model's parameters, and which are free, `[row, parameter]`."""
     return np.stack([one.z for one in rows]), table.free([one.effects for one in rows])
 

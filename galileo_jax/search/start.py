@@ -21,6 +21,9 @@ class Start:
       rivals: of a move's starts of a hypothesis with the same label only the best is followed.
       is_near: whether it is refined at once: beside a fit a race, which assumes more noise, would
         not tell the valleys apart.
+      cost: where a race ended, nats; there `z` is.
+      promise: that less what the width of the valley is worth.
+      num_agreeing: starts of the race that ended in its valley; 0: there was none.
     """
 
     effects: tuple[str, ...]
@@ -29,6 +32,9 @@ class Start:
     move: str
     rivals: int = 0
     is_near: bool = False
+    cost: float = np.nan
+    promise: float = np.nan
+    num_agreeing: int = 0
 
     @property
     def key(self) -> frozenset[str]:

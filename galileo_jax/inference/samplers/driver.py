@@ -1,4 +1,14 @@
-"""The one loop that drives every sampler: chains, warm-up, stopping, checkpoints."""
+"""The one loop that drives every sampler: chains, warm-up, stopping, checkpoints.
+
+    warm-up blocks: Robbins-Monro on the scale within a block; after it, mean and covariance from
+        the newer half of the warm-up, pooled over the chains and shrunk towards those before
+    sampling blocks: the sampler is frozen; stop when every monitored quantity has
+        R-hat < max_rhat and bulk ESS >= min_ess, or after max_steps
+
+The number of evaluations is exactly chains x (1 + steps). With m split chains R-hat - 1 is about
+m / (2 ESS) even in equilibrium, so that many chains make R-hat < 1.01 dear: eight chains need about
+800 effective draws.
+"""
 
 import dataclasses
 import signal
@@ -112,17 +122,7 @@ def sample(
     checkpoint: Path | None = None,
     identity: str = "",
 ) -> Posterior:
-    """Draws from exp(log_density) until converged.
-
-        warm-up blocks: Robbins-Monro on the scale within a block; after it, mean and
-            covariance from the newer half of the warm-up, pooled over the chains and
-            shrunk towards those before
-        sampling blocks: the sampler is frozen; stop when every monitored quantity has
-            R-hat < max_rhat and bulk ESS >= min_ess, or after max_steps
-
-    The number of evaluations is exactly chains x (1 + steps). With m split chains R-hat - 1
-    is about m / (2 ESS) even in equilibrium, so that many chains make R-hat < 1.01 dear:
-    eight chains need about 800 effective draws.
+    """The posterior exp(log_density) by draws; `status` says whether they converged.
 
     Arguments:
       key: the only source of randomness; the same key gives the same draws.
@@ -139,14 +139,42 @@ def sample(
       identity: what the log density stands for (clips, effects, options); a checkpoint
         of another identity is refused.
 
-    Returns:
-      The posterior; `status` says whether it converged.
-
     Raises:
       ValueError: shapes do not fit, or the log density is not finite at a start.
       InputError: the checkpoint belongs to another run, or is damaged.
     """
     start = jnp.asarray(start)
+    _check_shapes(sampler, start, names, settings)
+    monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
+    identity = _fingerprint(key, sampler, start, names, settings, identity)
+    states, sampler, history = _begun(sampler, log_density, start, checkpoint, identity)
+    total = settings.warmup_steps + settings.max_steps
+    state = _diagnose(history, settings, monitor) if _is_due(history, settings) else {}
+    while history.num_steps < total and not _is_enough(state, settings):
+        with _interrupt_deferred():
+            done, is_warmup = history.num_steps, history.num_steps < settings.warmup_steps
+            turns = jnp.arange(done, done + settings.block_steps, sampler.steps_per_turn)
+            gains = _gains(len(turns)) * (1.0 if is_warmup else 0.0)
+            arrays = (log_density, sampler, jax.random.key_data(key), states, turns, gains)
+            states, sampler, record = compiled(_run_block, (states, sampler, (0, 0, 0)), *arrays)
+            block = History(*(np.asarray(leaf) for leaf in record))
+            history = history.extended(block)
+            if is_warmup and isinstance(sampler, AbstractTunedSampler):
+                sampler = _refitted(sampler, history)
+            if checkpoint is not None:
+                checkpoints.save(Path(checkpoint), identity, (states, sampler), history)
+        if _is_due(history, settings):
+            state = _diagnose(history, settings, monitor)
+        if on_block is not None:
+            accepted = float(block.is_accepted.mean())
+            on_block(Progress(history.num_steps, total, is_warmup, accepted, state))
+    return _posterior(key, sampler, history, names, settings, state)
+
+
+def _check_shapes(
+    sampler: AbstractSampler, start: jax.Array, names: Sequence[str], settings: Settings
+) -> None:
+    """Raises ValueError where they do not fit."""
     if start.ndim != 2 or start.shape[1] != len(names):
         raise ValueError(f"start {start.shape} is not [chain, {len(names)}]")
     if settings.block_steps % sampler.steps_per_turn:
@@ -154,8 +182,18 @@ def sample(
             f"block_steps is {settings.block_steps}; {sampler.name} makes "
             f"{sampler.steps_per_turn} steps at a time"
         )
-    monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
-    digest = checkpoints.fingerprint(
+
+
+def _fingerprint(
+    key: jax.Array,
+    sampler: AbstractSampler,
+    start: jax.Array,
+    names: Sequence[str],
+    settings: Settings,
+    identity: str,
+) -> str:
+    """What a checkpoint must be of, to be gone on from; arguments as of `sample`."""
+    return checkpoints.fingerprint(
         [
             np.asarray(jax.random.key_data(key)),
             *(np.asarray(leaf) for leaf in jax.tree.leaves(sampler)),
@@ -167,51 +205,28 @@ def sample(
         ]
     )
 
+
+def _begun(
+    sampler: AbstractSampler,
+    log_density: LogDensity,
+    start: jax.Array,
+    checkpoint: Path | None,
+    identity: str,
+) -> tuple[Any, AbstractSampler, History]:
+    """The chains' states, the sampler and the draws so far: of a checkpoint that is there, or none.
+
+    Raises:
+      ValueError: the log density is not finite at a start.
+      InputError: the checkpoint belongs to another run, or is damaged.
+    """
     if checkpoint is not None and Path(checkpoint).exists():
         # What the file must look like follows from shapes alone, without an evaluation.
         shapes = _states_like(sampler, start)
-        (states, sampler), history = checkpoints.load(checkpoint, digest, (shapes, sampler))
-    else:
-        states = _initial_states(sampler, log_density, start)
-        _check_finite(np.asarray(states.log_density))
-        history = _empty_history(states)
-
-    total = settings.warmup_steps + settings.max_steps
-    state = _diagnose(history, settings, monitor) if _is_due(history, settings) else {}
-    while history.num_steps < total and not _is_enough(state, settings):
-        with _interrupt_deferred():
-            is_warmup = history.num_steps < settings.warmup_steps
-            end = history.num_steps + settings.block_steps
-            turns = jnp.arange(history.num_steps, end, sampler.steps_per_turn)
-            states, sampler, record = compiled(
-                _run_block,
-                (states, sampler, (0, 0, 0)),
-                log_density,
-                sampler,
-                jax.random.key_data(key),
-                states,
-                turns,
-                _gains(len(turns)) * (1.0 if is_warmup else 0.0),
-            )
-            block = History(*(np.asarray(leaf) for leaf in record))
-            history = history.extended(block)
-            if is_warmup and isinstance(sampler, AbstractTunedSampler):
-                sampler = _refitted(sampler, history)
-            if checkpoint is not None:
-                checkpoints.save(Path(checkpoint), digest, (states, sampler), history)
-        if _is_due(history, settings):
-            state = _diagnose(history, settings, monitor)
-        if on_block is not None:
-            on_block(
-                Progress(
-                    num_steps=history.num_steps,
-                    max_steps=total,
-                    is_warmup=is_warmup,
-                    acceptance_rate=float(block.is_accepted.mean()),
-                    convergence=state,
-                )
-            )
-    return _posterior(key, sampler, history, names, settings, state)
+        (states, sampler), history = checkpoints.load(checkpoint, identity, (shapes, sampler))
+        return states, sampler, history
+    states = _initial_states(sampler, log_density, start)
+    _check_finite(np.asarray(states.log_density))
+    return states, sampler, _empty_history(states)
 
 
 def _initial_states(sampler: AbstractSampler, log_density: LogDensity, start: jax.Array) -> Any:
