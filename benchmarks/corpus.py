@@ -74,7 +74,7 @@ def recipes(index: int, is_video: bool) -> Iterator[dict[str, Any]]:
     else:
         plain["track_noise"] = float(np.exp(generator.uniform(*np.log(NOISE_M))))
     if index // len(SCENARIOS) % 3:
-        for effect in generator.permutation(sorted(gx.effects())):
+        for effect in generator.permutation(sorted(gx.effects().index)):
             strength = float(generator.uniform(*STRENGTHS))
             yield plain | {"effects": {str(effect): {}}, "strength": strength}
     yield plain

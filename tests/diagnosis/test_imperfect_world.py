@@ -12,6 +12,7 @@ from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure
 from galileo_jax.report.diagnosis_text import roughness
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from tests.precision import in_64_bit
 
@@ -156,8 +157,8 @@ def test_an_effect_is_expected_at_its_strength_beside_imperfections(tmp_path):
     seen = measure(load(tmp_path / "ball.yaml"))
     trials = with_library([seen.clip], [seen.observation], "rigid", None)
     fitter = GradientFitter(trials)
-    base = Hypothesis((), fitter.fit(0, effects=()))
-    own = Hypothesis(("air_drag",), fitter.fit(0, effects=("air_drag",)))
+    base = Hypothesis((), best_fit(fitter, 0, effects=()))
+    own = Hypothesis(("air_drag",), best_fit(fitter, 0, effects=("air_drag",)))
     prior = VerdictStakes(trials, False).log_prior(own)
     exact = Candidate(own.effects, own, {}, 0.0, own.evidence_over(base), prior, 0.5, None, ())
     world = imperfect_world(trials, base, 3.0, 0)
