@@ -89,6 +89,7 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
         export = [sys.executable, "-m", "galileo_jax.export", str(model), "--to", "csv"]
         if "by" in case and not code:
             _run([*export, "--fitted", "--out", scratch], package)
+        typed = num_typed(path.parent, case["file"], declared)
         motions = gallery.motions(Path(scratch) / "track.csv", case.get("until_s", math.inf))
     values: dict[str, Any] = {}
     for part in ("nuisances", "derived", "parameters"):
@@ -97,7 +98,7 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
     row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in wanted if name in values},
            "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
-           "keys": _num_keys(declared), "typed": num_typed(path.parent, case["file"], declared),
+           "keys": _num_keys(declared), "typed": typed,
            "sentence": document.get("sentence", ""),
            "motions": motions,
            "said": said.replace(scratch, "").strip().splitlines()[-25:]}  # fmt: skip
