@@ -16,7 +16,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
 from galileo_jax.measurement.infer_slope import LEVEL_SD_DEG
-from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
+from galileo_jax.observation.observation import Observation
 
 CLEAR = 4.0
 TURNED_DEG = 6.0
@@ -121,9 +121,7 @@ def _direction(observation: Observation) -> tuple[np.ndarray, float, bool] | Non
     if observation.position_m.shape[1] != 2:
         return None
     points = observation.position_m[0][:, observation.mask[0]]
-    covariance = observation.covariance_m2[0][..., observation.mask[0]]
-    trace = np.einsum("aat->t", covariance)
-    if points.shape[1] < FEWEST or trace.max() >= UNMEASURED_SD_M**2:
+    if points.shape[1] < FEWEST:
         return None
     gone = points - points[:, :1]
     away = points - points.mean(axis=1, keepdims=True)
@@ -134,6 +132,6 @@ def _direction(observation: Observation) -> tuple[np.ndarray, float, bool] | Non
     if not length:
         return None
     is_straight = bool(np.abs(axes[:, 0] @ away).max() <= STRAIGHT * length)
-    noise = float(np.median(trace)) / 2
+    noise = float(np.median(observation.variance_m2[0, observation.mask[0]]))
     scatter = max(float(values[0]) / (points.shape[1] - 2), noise)
     return along, math.degrees(math.sqrt(scatter / float(values[1]))), is_straight
