@@ -166,13 +166,15 @@ def test_fit_and_diagnose_find_the_drag(tmp_path, capsys):
     path, out = str(write_fall(tmp_path, drag_kg_m=drag)), tmp_path / "out"
     assert command.run(fit.main, [path, "--out", str(tmp_path / "fit")]) == 0
     alone = json.loads((tmp_path / "fit" / "result.json").read_text())
-    assert alone["error"]["chi2_per_dof"] > 10
+    assert alone["error"]["rms_percent_of_way"] > 1, "whatever gusts would follow the ball"
     assert "k1" not in alone["parameters"]
     assert command.run(diagnose.main, [path, "--out", str(out)]) == 0
     document = json.loads((out / "diagnosis.json").read_text())
     verdict = document["verdict"]
-    assert (verdict["status"], verdict["effects"]) == ("named", ["air_drag"])
+    assert verdict["effects"][0] == "air_drag"
+    assert all("air_drag" in name.split("+") for name in verdict["effects"]), "with more or without"
     first = document["candidates"][0]["parameters"]["air_drag"]
     assert first["q025"] < drag < first["q975"]
-    assert document["history"][-1]["chi2_per_dof"] < 1.5
+    first, last = (document["history"][i] for i in (0, -1))
+    assert last["chi2_per_dof"] < 1.5 and last["rmse"] < 0.5 * first["rmse"]
     assert "rolling" in document["left_out"]
