@@ -135,13 +135,13 @@ def make_loads(
     )
 
 
-def _foot_drag(log_kept: PerObject, state: State, law: Dynamics, scene: Surroundings) -> PerObject:
+def _foot_drag(log_kept: Array, state: State, law: Dynamics, scene: Surroundings) -> PerObject:
     """A short zone of drag (or thrust) past the foot, N, for a factor f on the speed there.
 
         F = M ln(f) w(x) v |v|,   w a raised cosine over the zone with integral 1,
 
     so that dv/dx = ln(f) w(x) v: what crosses the zone leaves it with f times the speed,
-    whatever its speed. `log_kept`: ln(f).
+    whatever its speed. `log_kept`: ln(f), alike for all objects, `[..., 1]`.
     """
     xp, speed = law.mass.__array_namespace__(), state.speed_m_s
     comes_down = xp.asarray(scene.comes_down, dtype=law.mass.dtype)
