@@ -245,15 +245,17 @@ class Problem:
             d = U_b U_b^T C^-1 r,    U_b: patterns of what bodies do, not of errors of the marks
 
         All imperfections are of their priors' medians in it: d is the same linear function of the
-        residuals r for every model of a track, so that what it leaves falls as models get better.
+        residuals r for every model with imperfections of a track, so that what it leaves falls as models get better.
 
         Args:
           predicted_m: `[object, axis, frame]`.
           is_usual: else imperfections are of the sizes that were found, as part of the model.
 
         Returns:
-          the same shape; the prediction where imperfections have no place.
+          the same shape; the prediction in an exact world, and where imperfections have no place.
         """
+        if self.sizes is None:
+            return predicted_m
         whose = self._usual if is_usual else self
         own = [whose._sized(name) for name in self.patterns if not TERMS[name].is_of_marks]
         if not own:
