@@ -244,8 +244,8 @@ class Problem:
 
             d = U_b U_b^T C^-1 r,    U_b: patterns of what bodies do, not of errors of the marks
 
-        All imperfections are of their priors' medians in it: d is the same linear function of the
-        residuals r for every model with imperfections of a track, so that what it leaves falls as models get better.
+        All imperfections are of their priors' medians in it, whatever sizes were found: d is the
+        same linear function of the residuals r, and what it leaves falls as models get better.
 
         Args:
           predicted_m: `[object, axis, frame]`.
