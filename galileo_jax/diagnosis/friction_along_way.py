@@ -21,7 +21,7 @@ from galileo_jax.inference.fits.linear_clip import averaged, linear_clips
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.rollout.motion import dynamics, state_at
-from galileo_jax.similarity.gaussian_likelihood import inverse_root_of, white_patterns
+from galileo_jax.similarity.gaussian_likelihood import white_patterns
 from galileo_jax.statespace.kinematics import Kinematics
 from galileo_jax.statespace.path_deviation import PLACE, SPEED, deviations
 from galileo_jax.statespace.term import TERMS
@@ -170,9 +170,7 @@ def _moved(problem: Problem, tangent: np.ndarray) -> np.ndarray:
     unit = np.zeros((frames, count, count, axes, frames))
     for i in range(count):
         unit[np.arange(frames), i, i, :, np.arange(frames)] = tangent[i].T
-    return white_patterns(
-        unit.reshape(-1, count, axes, frames), inverse_root_of(problem.observation)
-    )
+    return white_patterns(unit.reshape(-1, count, axes, frames), problem.data.inverse_root)
 
 
 def _coefficients(

@@ -107,22 +107,15 @@ def _of_clip(part: Rolled, data: Part, z: jax.Array, noise: jax.Array) -> jax.Ar
     whitening = clip.data.whitening
     if data.sized is not None:
         left = left_of(kind, theta, position, velocity, clip.data, clip.scene)
-        found = _with_sizes(left, noise, data.sized, whitening.num_values)
+        along2 = jnp.einsum("kmn,n->km", data.sized.turned, data.sized.basis @ left) ** 2
+        found = GaussianLikelihood.log_density_by_modes(
+            jnp.sum(left**2), along2, noise, data.sized.gain, whitening.num_values
+        )
         return jnp.where(jnp.any(jnp.abs(left) >= FAILED), -jnp.inf, found)
     white = white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
     log_determinant = GaussianLikelihood.log_determinant(noise, whitening)
     has_failed = jnp.any(jnp.abs(white) >= FAILED)
     return jnp.where(has_failed, -jnp.inf, -0.5 * (jnp.sum(white**2) + log_determinant))
-
-
-def _with_sizes(left: jax.Array, noise: jax.Array, sized: Sized, num_values: Any) -> jax.Array:
-    """Log N(left; 0, C_k) of residuals in stated errors `[value]`, `[size]`."""
-    along2 = jnp.einsum("kmn,n->km", sized.turned, sized.basis @ left) ** 2
-    variance = noise**2
-    rest = (jnp.sum(left**2) - jnp.sum(along2, axis=1)) / variance
-    square = rest + jnp.sum(along2 / (variance + sized.gain**2), axis=1)
-    volume = jnp.sum(jnp.log1p(sized.gain**2 / variance), axis=1)
-    return -0.5 * (square + num_values * jnp.log(variance) + volume)
 
 
 def parts_of(
@@ -136,7 +129,7 @@ def parts_of(
     """
     if any(not hasattr(problem.engine, "roll_out") for problem in trials.problems):
         return None
-    draws, of_sizes = (None, None) if fit is None else sizes_of(trials, fit, LEAST_SIZES)
+    draws, of_sizes = ([], None) if fit is None else sizes_of(trials, fit, LEAST_SIZES)
     rolled, data = [], []
     for index, problem in enumerate(trials.problems):
         clip, model = FittedClip.of(trials, index), problem.model
@@ -144,10 +137,7 @@ def parts_of(
         long = rounded_up(last + 1, RECORDS)
         roll_out = problem.engine.roll_out  # pyright: ignore
         rolled.append(Rolled(roll_out, every, model.names, long, clip.kind))
-        sized = None
-        if fit is not None and fit.sizes is not None and draws is not None:
-            sized = _sized(clip, [dict(zip(fit.sizes.names, x, strict=True)) for x in draws])
-        data.append(Part(clip.arrays, np.asarray(last), sized))
+        data.append(Part(clip.arrays, np.asarray(last), _sized(clip, draws) if draws else None))
     return tuple(rolled), jax.tree.map(jnp.asarray, Data(tuple(data), of_sizes))
 
 

@@ -142,8 +142,6 @@ class Problem:
         other = replace(self, sizes=sizes)
         for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
             other.__dict__[name] = getattr(self, name)
-        if "_usual" in self.__dict__:
-            other.__dict__["_usual"] = self._usual
         return other
 
     @cached_property

@@ -114,6 +114,27 @@ class GaussianLikelihood:
         return -0.5 * (jnp.sum(white**2) + log_determinant)
 
     @staticmethod
+    def log_density_by_modes(
+        left2: Any, along2: Any, noise_scale: Any, gain: Any, count: Any
+    ) -> Any:
+        """The same of residuals y in the stated errors, from their squares: NumPy's or JAX's.
+
+            -1/2 (|y|^2 - sum a^2) / s^2 - 1/2 sum a^2 / (s^2 + g^2) - 1/2 log |C|,    a = Q^T y
+
+        Args:
+          left2: `[...]`, |y|^2.
+          along2: `[..., mode]`, a^2.
+          noise_scale: `[...]`, s.
+          gain: `[..., mode]`, g.
+          count: how many numbers were measured.
+        """
+        xp, variance = along2.__array_namespace__(), noise_scale**2
+        of_mode = variance[..., None]
+        square = (left2 - along2.sum(-1)) / variance + (along2 / (of_mode + gain**2)).sum(-1)
+        volume = count * xp.log(variance) + xp.log1p(gain**2 / of_mode).sum(-1)
+        return -0.5 * (square + volume)
+
+    @staticmethod
     def degrees(noise_scale: Any, data: Whitening) -> Any:
         """How many numbers tell of the tracker's noise: the measured less those the modes take."""
         return data.num_values - (data.gain**2 / (noise_scale**2 + data.gain**2)).sum()

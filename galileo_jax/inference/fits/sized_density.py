@@ -17,7 +17,7 @@ from galileo_jax.inference.fits.fitted_clip import FittedClip
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
-from galileo_jax.similarity.gaussian_likelihood import Whitening
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 # Of the draws of sizes: more of few measured values, whose squared number is what each costs.
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
@@ -25,13 +25,13 @@ LEAST_SIZES, MOST_SQUARES = 32, 500_000
 
 def sizes_of(
     trials: JointProblem, fit: GradientFit, num: int
-) -> tuple[Float[np.ndarray, "draw term"], Float[np.ndarray, " draw"]]:
-    """Draws of the terms' sizes, x, and log p(y | x) of each, the largest 0."""
+) -> tuple[list[dict[str, float]], Float[np.ndarray, " draw"]]:
+    """Draws of the terms' sizes, x by name, and log p(y | x) of each, the largest 0."""
     assert fit.sizes is not None
     draws = fit.sizes.draws[:num, : len(fit.sizes.x)]
     linear = linear_clips(trials, fit)
     each = np.array([log_likelihood(linear, trials.terms, x) for x in draws])
-    return draws, each - each.max()
+    return [dict(zip(fit.sizes.names, x, strict=True)) for x in draws], each - each.max()
 
 
 class SizedDensity:
@@ -42,13 +42,7 @@ class SizedDensity:
         self._clips, self._fit = clips, fit
         num = max(LEAST_SIZES, MOST_SQUARES // fit.num_values**2)
         draws, self._of_sizes = sizes_of(trials, fit, num)
-        self._data = [
-            [
-                clip.problem.with_sizes(dict(zip(fit.sizes.names, x, strict=True))).data
-                for x in draws
-            ]
-            for clip in clips
-        ]
+        self._data = [[clip.problem.with_sizes(x).data for x in draws] for clip in clips]
 
     def __call__(self, z: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
         """At `z`, noise scales last."""
@@ -76,10 +70,8 @@ def _log_likelihood(
     left: Float[np.ndarray, "point value"], noise: Float[np.ndarray, " point"], data: Whitening
 ) -> Float[np.ndarray, " point"]:
     """Of what was measured, up to the constant of the tracker's own covariance."""
-    basis, variance = data.basis.reshape(len(data.gain), -1), noise[:, None] ** 2
     with np.errstate(over="ignore", invalid="ignore"):
-        along2 = (left @ basis.T) ** 2
-        rest = np.sum(left**2, axis=1) - np.sum(along2, axis=1)
-        square = rest / variance[:, 0] + np.sum(along2 / (variance + data.gain**2), axis=1)
-    volume = np.sum(np.log1p(data.gain**2 / variance), axis=1)
-    return -0.5 * (square + data.num_values * np.log(variance[:, 0]) + volume)
+        along2 = (left @ data.basis.reshape(len(data.gain), -1).T) ** 2
+        return GaussianLikelihood.log_density_by_modes(
+            np.sum(left**2, axis=1), along2, noise, data.gain, data.num_values
+        )
