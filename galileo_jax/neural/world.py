@@ -23,6 +23,7 @@ from galileo_jax.model.effects.nuisances import (
     NUISANCES,
     contact_gap,
     foot_transition,
+    impact_momentum,
     impact_restitution,
 )
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
@@ -47,7 +48,8 @@ CODED_SHARE = 0.4  # clips whose coder shifts what rests once
 NOISE_SCALE_SD = 0.3
 NAMES = (
     *("m1", "k1", "m2", "k2", "start_offset_object1", "start_offset_object2"),
-    *("foot_transition", "impact_restitution", "contact_gap", "release_instant"),
+    *("foot_transition", "impact_restitution", "impact_momentum_object2"),
+    *("contact_gap", "release_instant"),
 )
 
 
@@ -98,7 +100,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     rebound = imperfect * impact_restitution.PRIOR.forward(normal())
     zero = jnp.zeros(())
     overlap = imperfect * contact_gap.PRIOR.forward(normal())
-    theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, overlap, instant])
+    passed_on = 1.0 + imperfect * impact_momentum.SD * normal()
+    theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, passed_on, overlap, instant])
     scene = _scene(angle, half_length, half_height, release, object2)
     position, velocity = roll_out(NUISANCES, NAMES, NUM_RECORDS, RECORD_DT_S, theta, scene)
     records = jnp.arange(NUM_RECORDS) * RECORD_DT_S

@@ -58,6 +58,10 @@ OF_OBJECTS = (  # what parameters' names with numbers in them mean
         "second end of wall {}, to the left of where it is declared",
     ),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
+    (
+        re.compile(r"impact_momentum_object(\d+)"),
+        "momentum that object {} gains in its hit, over what is lost to it",
+    ),
 )
 OUTSIDE = (  # what nuisances mean that are far from what is usual
     (re.compile(r"impact_restitution"), "the objects bounce, with a restitution of {value:.2f}"),

@@ -49,6 +49,8 @@ class Dynamics(NamedTuple):
       turn: cos and sin, each `[...]`, of the angle by which the path turns at the foot.
       foot: `[...]`, factor on the speed kept at the foot.
       restitution: `[...]`, between objects.
+      at_hits: `[..., object]`, kg; as inertia, and by how much of its momentum each hit passes on
+        (the rigid engine; MuJoCo's hits conserve it).
       overlap_m: `[...]`, how much further apart neighbours touch again once they have met
         (the rigid engine; MuJoCo's contacts give way by themselves).
       coefficient: `State` to friction coefficients `[..., object]`.
@@ -70,6 +72,7 @@ class Dynamics(NamedTuple):
     turn: tuple[Array, Array]
     foot: Array
     restitution: Array
+    at_hits: PerObject
     overlap_m: Array
     coefficient: Callable[[State], PerObject]
     drive: Callable[[State], PerObject]
@@ -119,9 +122,10 @@ def dynamics(
     laws = _acting([e.friction(theta, scene) for e in effects], acts)
     adds = _acting([_added(e.force(theta, scene)) for e in effects], acts)
     coefficient, drive, brake = _forces(laws, adds, friction, mass, (ramp, table), scene)
+    inertia = mass if share is None else mass * (1.0 + share)
     return Dynamics(
         mass=mass,
-        inertia=mass if share is None else mass * (1.0 + share),
+        inertia=inertia,
         rim=_rim(mass, scene),
         friction=friction,
         start_m=start,
@@ -131,6 +135,7 @@ def dynamics(
         turn=(xp.cos(ramp - table), xp.sin(ramp - table)),
         foot=foot,
         restitution=xp.zeros(lead) if restitution is None else restitution,
+        at_hits=_at_hits(inertia, [e.passed_on(theta, scene) for e in effects]),
         overlap_m=xp.zeros(lead) if overlap is None else overlap,
         coefficient=coefficient,
         drive=drive,
@@ -139,6 +144,16 @@ def dynamics(
         is_steady=not laws and not adds,
         pushes=tuple(push for e in effects if (push := e.push(theta, scene)) is not None),
     )
+
+
+def _at_hits(inertia: PerObject, factors: Sequence[tuple[Array, ...] | None]) -> PerObject:
+    """What inertias look like in hits: each front body's is divided by the factors up to it."""
+    xp = inertia.__array_namespace__()
+    for each in factors:
+        if each is not None:
+            passed = xp.stack([xp.ones_like(each[0]), *each], axis=-1)
+            inertia = inertia / xp.cumulative_prod(passed, axis=-1)
+    return inertia
 
 
 def _forces(

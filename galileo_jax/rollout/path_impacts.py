@@ -65,7 +65,7 @@ def after_hits(
         approach = v[i] - v[i + 1]
         e = jnp.where(approach > PLASTIC_M_S, law.restitution, 0.0)
         ahead.append(ahead[-1] + jnp.where(meets[i], e * approach, 0.0))
-    inertia = [law.inertia[i] for i in range(count)]
+    inertia = [law.at_hits[i] for i in range(count)]
     behind = [v[i] - ahead[i] for i in range(count)]
     links, common = apart(count), behind
     for _ in range(count - 1):

@@ -89,6 +89,20 @@ def test_restitution_and_momentum(wanted, mass):
     assert np.dot(mass, after) == pytest.approx(np.dot(mass, before), abs=rubbed)
 
 
+@pytest.mark.parametrize("factor", [0.98, 1.0, 1.02])
+@pytest.mark.parametrize("mass", [(0.4, 0.3), (0.1, 2.0)])
+def test_a_hit_passes_on_so_much_of_what_the_rear_body_loses(factor, mass):
+    experiment = replace(SMOOTH, mass_kg=mass)
+    hit = solve(experiment, np.zeros(1)).hit_s
+    assert hit
+    _, velocity, times = simulate(experiment, hit + 0.02, impact_momentum_object2=factor)
+    before = velocity[:, 0, times < hit][:, -1]
+    after = velocity[:, 0, times > hit][:, 0]
+    rubbed = 2 * 9.81 * LEAST_FRICTION * (times[1] - times[0])
+    lost, gained = mass[0] * (before[0] - after[0]), mass[1] * (after[1] - before[1])
+    assert gained == pytest.approx(factor * lost, abs=rubbed)
+
+
 @pytest.mark.parametrize("further", [0.0, 0.002])
 def test_bodies_that_meet_again_touch_further_apart(further):
     """The front one, rougher, is caught up with: at so much more distance than at the hit."""

@@ -341,6 +341,10 @@ class Effect:
         """Returns the coefficient of restitution between objects `[...]`, or None."""
         return None
 
+    def passed_on(self, theta: Theta, scene: Surroundings) -> tuple[Array, ...] | None:
+        """Returns for each pair of neighbours the factor on the momentum in a hit, or None."""
+        return None
+
     def overlap(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns by how much less neighbours are apart at their first hit `[...]`, m, or None."""
         return None

@@ -10,6 +10,7 @@ from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
+from galileo_jax.model.effects.nuisances.impact_momentum import ImpactMomentum
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
@@ -22,6 +23,7 @@ NUISANCES: tuple[Effect, ...] = (
     DeclaredAngle(),
     DeclaredScale(),
     ImpactRestitution(),
+    ImpactMomentum(),
     ContactGap(),
     ReleaseInstant(),
     BoardShape(),
