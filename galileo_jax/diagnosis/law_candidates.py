@@ -45,7 +45,7 @@ def law_candidates(
     """
     made = []
     wanted = [FORM_SHAPES[c.effects[0]] for c in fitted[:1] if c.family is not None]
-    for law in fitted_laws(trials, near, views, wanted, on_stage, base.weighed is not None):
+    for law in fitted_laws(trials, near, views, wanted, on_stage):
         fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
         values = {name: f"{value:.4g}" for name, value in law.constants().items()}
         made.append(

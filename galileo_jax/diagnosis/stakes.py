@@ -6,7 +6,6 @@ import numpy as np
 
 from galileo_jax.diagnosis.verdict import (
     decisive_margin,
-    is_close_call,
     log_prior,
     may_decide,
     num_expected,
@@ -45,10 +44,6 @@ class VerdictStakes(Stakes):
     ) -> np.ndarray:
         """See `verdict.may_decide`."""
         return may_decide(log_odds, is_form, num_effects, self.decisive, self.is_adequate)
-
-    def is_close_call(self, log_odds: np.ndarray) -> np.ndarray:
-        """See `verdict.is_close_call`."""
-        return is_close_call(log_odds, self.decisive, self.is_adequate)
 
 
 def odds_of(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:

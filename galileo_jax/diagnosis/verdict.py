@@ -47,9 +47,6 @@ EXPECTED_ODDS = 3.0
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# By how much Laplace's evidences may be wrong, nats: hypotheses so much farther apart than a rule
-# asks are as far apart by any other.
-LAPLACE_NATS = 3.0
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
@@ -475,23 +472,3 @@ def is_about_pairs(verdict: Verdict) -> bool:
     if verdict.status == "named":
         return len(verdict.effects) > 1
     return verdict.status == "ambiguous" and all("+" in name for name in verdict.effects)
-
-
-def is_close_call(log_odds: np.ndarray, decisive: float, is_base_adequate: bool) -> np.ndarray:
-    """Of which hypotheses, `[hypothesis]`, Laplace's evidence will not do.
-
-    The verdict might be another if their evidences were, by `LAPLACE_NATS`. Of one that is far
-    ahead of all others, the model without effects among them, that is never so.
-
-    Args:
-      log_odds: `[hypothesis]`, by Laplace.
-      decisive: nats by which a rival must be behind.
-      is_base_adequate: whether the model without effects leaves nothing but noise.
-    """
-    top = float(log_odds.max())
-    if is_base_adequate and top < CONVINCING - LAPLACE_NATS:
-        return np.zeros(len(log_odds), bool)
-    least = top - decisive - LAPLACE_NATS
-    close = log_odds > least
-    is_beside_none = least < (CONVINCING if is_base_adequate else 0.0)
-    return close if close.sum() + is_beside_none > 1 else np.zeros(len(log_odds), bool)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.importance_sampling import Weighed
 from galileo_jax.inference.joint_problem import JointProblem
 
 
@@ -18,13 +17,11 @@ class Hypothesis:
       effects: names, in the order in which they were added.
       fit: of all parameters.
       trials: whose parameters these are, where not the diagnosis's own: of a law.
-      weighed: its evidence, mended; None where Laplace's has to do.
     """
 
     effects: tuple[str, ...]
     fit: GradientFit
     trials: JointProblem | None = None
-    weighed: Weighed | None = None
 
     @property
     def key(self) -> frozenset[str]:
@@ -35,20 +32,9 @@ class Hypothesis:
         """The trials that it was fitted to, where the diagnosis's own are `trials`."""
         return self.trials or trials
 
-    @property
-    def log_evidence(self) -> float:
-        """By rollouts where it was mended, else by Laplace; up to the data's constant, nats."""
-        return self.fit.log_evidence if self.weighed is None else self.weighed.log_evidence
-
     def evidence_over(self, base: "Hypothesis") -> float:
-        """Log evidence less that of another, nats.
-
-        Like with like where nothing was mended. What stays with Laplace's beside a mended base is
-        farther behind the leading hypothesis than Laplace's is wrong.
-        """
-        if base.weighed is None:
-            return self.fit.log_evidence - base.fit.log_evidence
-        return self.log_evidence - base.log_evidence
+        """Log evidence less that of another, nats."""
+        return self.fit.log_evidence - base.fit.log_evidence
 
     @property
     def misfit(self) -> float:

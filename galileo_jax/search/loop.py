@@ -5,7 +5,6 @@
              it comes to the valley of a better one of its hypothesis, or falls far behind.
     refine:  the best end of each hypothesis at the clip's own noise, the most promising first; of
              those on which the conclusion may hang, every end.
-    weigh:   where nats decide, evidence by rollouts instead of Laplace's.
 
 It ends when a round changes nothing on which the conclusion may hang.
 """
@@ -23,9 +22,7 @@ from galileo_jax.inference.fits.descent import (
     in_valley,
     valleys,
 )
-from galileo_jax.inference.fits.distinct_modes import apart
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.importance_sampling import weighed
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.moves import MOVES, Move
 from galileo_jax.search.score_tests import score_tests
@@ -126,7 +123,7 @@ def _round(
     ]
     for end, fit in _refined(table, [*rough, *(e for e in (*near, *rest) if e.key in deciding)]):
         table = take(table, end, fit)
-    return _weighed(table, on_entry)
+    return table
 
 
 def _scores(table: Table, ends: Sequence[Start]) -> dict[Key, float]:
@@ -243,50 +240,3 @@ def _owners(keys: Sequence[Key]) -> tuple[list[Key], np.ndarray]:
     """The hypotheses, each once, and which of them each key is of."""
     every = list(dict.fromkeys(keys))
     return every, np.array([every.index(key) for key in keys])
-
-
-def _weighed(table: Table, on_entry: Callable[[Table, Entry], None]) -> Table:
-    """The table with evidence by rollouts where Laplace's will not do.
-
-    A draw that is better than all fits is where one of them goes on.
-    """
-    rows = table.best_first
-    if not rows:
-        return table
-    log_odds = np.array([table.log_odds(row.hypothesis) for row in rows])
-    close = np.flatnonzero(table.stakes.is_close_call(log_odds))
-    if not close.size:
-        return table
-    for key in (BASE, *(rows[i].hypothesis.key for i in close)):
-        entry = table.entries[key]
-        if entry.hypothesis.weighed is not None:
-            continue
-        entry = _mended(table, entry)
-        if key == BASE and entry.hypothesis.weighed is None:
-            return table.with_entry(entry)  # all others would be measured from another place
-        table = table.with_entry(entry)
-        if key != BASE:
-            on_entry(table, entry)
-    return table
-
-
-def _mended(table: Table, entry: Entry) -> Entry:
-    """The row with the evidence of all its valleys, by rollouts round them."""
-    without, residuals = _without_one(table, entry), table.fitter.residuals
-    found = weighed(apart(entry.fits), residuals, table.seed, without)
-    if found.better is not None:
-        count = len(entry.fits[0].steps)
-        free = entry.fits[0].free[None, :count]
-        again = table.fitter.polish(found.better[None, :count], free, np.zeros(1, int))
-        entry = entry.with_fits(list(again.values()))
-        found = weighed(apart(entry.fits), residuals, table.seed, without)
-    sure = found if found.is_sure else None
-    return replace(entry, hypothesis=replace(entry.hypothesis, weighed=sure))
-
-
-def _without_one(table: Table, entry: Entry) -> GradientFit | None:
-    """The best fit without one of the effects of a row; None of the model without effects."""
-    key = entry.hypothesis.key
-    less = [table.entries[key - {name}] for name in key if key - {name} in table.entries]
-    fits = [one.hypothesis.fit for one in less]
-    return max(fits, key=lambda fit: fit.log_evidence, default=None)

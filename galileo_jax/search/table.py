@@ -34,10 +34,6 @@ class Stakes:
         """On which hypotheses the conclusion may hang; these are searched for with care."""
         return np.zeros(len(log_odds), bool)
 
-    def is_close_call(self, log_odds: Float[np.ndarray, " row"]) -> Bool[np.ndarray, " row"]:
-        """Of which hypotheses Laplace's evidence will not do."""
-        return np.zeros(len(log_odds), bool)
-
 
 @dataclass(frozen=True, eq=False)
 class Entry:
@@ -56,18 +52,12 @@ class Entry:
     num_agreeing: int = LEAST_AGREEING
 
     def with_fits(self, fits: Sequence[GradientFit], by: float = 0.0) -> "Entry":
-        """The same with more fits; one that is better `by` nats takes the place of the old one.
-
-        Evidence by rollouts is that of the posterior, whatever was refined: it goes where the new
-        fit is better by `CHANGED_NATS`, for its valley was not known.
-        """
+        """The same with more fits; one that is better `by` nats takes the place of the old one."""
         every, known = (*self.fits, *fits), self.hypothesis
         best = max(every, key=lambda fit: fit.log_evidence)
-        gain = best.log_evidence - known.fit.log_evidence
-        if gain <= by:
+        if best.log_evidence - known.fit.log_evidence <= by:
             return replace(self, fits=every)
-        weighed = known.weighed if gain < CHANGED_NATS else None
-        return replace(self, fits=every, hypothesis=replace(known, fit=best, weighed=weighed))
+        return replace(self, fits=every, hypothesis=replace(known, fit=best))
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
     family = [made("slope_q", 90.0 - i, *way) for i, way in enumerate(ways)]
     evidence = {"push": 285.0, "friction": 275.0}
 
-    def fitted(trials, near, found, views, is_weighed):
+    def fitted(trials, near, found, views):
         return [
             SimpleNamespace(
                 structure=one.structure,

@@ -15,7 +15,6 @@ from galileo_jax.diagnosis.verdict import (
     decisive_margin,
     explains,
     form_that_leads,
-    is_close_call,
     is_nothing_missing,
     log_prior,
     looked_at_again,
@@ -580,25 +579,6 @@ def test_a_pair_that_cannot_contest_the_leading_effect_is_left_out():
     ahead = candidate(PAIR, 41.0)
     assert without_surplus([single, ahead, far]) == [single, ahead, far]
     assert without_surplus([]) == []
-
-
-@pytest.mark.parametrize(
-    ("log_odds", "is_adequate", "expected"),
-    [
-        ([30.0, 24.0 - EDGE, 0.0], False, [False, False, False]),  # 6 nats ahead of all
-        ([30.0, 24.0 + EDGE, 0.0], False, [True, True, False]),
-        ([6.0 + EDGE], False, [False]),  # far ahead of no effect
-        ([6.0 - EDGE], False, [True]),
-        ([16.0 + EDGE, 0.0], True, [False, False]),  # a faint effect needs 7 nats
-        ([16.0 - EDGE, 0.0], True, [True, False]),
-        ([4.0 + EDGE, -4.0], True, [True, True]),
-        ([4.0 - EDGE, 3.0], True, [False, False]),  # never comes to convince
-    ],
-)
-def test_whose_evidence_must_be_right_to_a_nat(log_odds, is_adequate, expected):
-    margin = 6.0 if is_adequate else 3.0
-    found = is_close_call(np.array(log_odds), margin, is_adequate)
-    assert found.tolist() == expected
 
 
 def test_a_pair_with_what_is_expected_counts_as_one_effect():

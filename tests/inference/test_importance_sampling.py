@@ -1,4 +1,4 @@
-"""The evidence by importance, against posteriors whose evidence a sum over a grid gives."""
+"""Weighed draws, of posteriors whose moments and evidence a sum over a grid gives."""
 
 from dataclasses import replace
 from typing import Any
@@ -40,12 +40,10 @@ class Known:
         return cost(self.whites(points), points.z)
 
     def slopes(self, points, steps, is_central):
-        (z,) = points.z
-        ahead, behind = (
-            np.stack(self.white(*(z + s * np.eye(2)).T), axis=1) for s in (STEP, -STEP)
-        )
-        jacobian = ((ahead - behind) / (2 * STEP)).T
-        return Slopes([jacobian[None]], self.whites(points), np.arange(2)[None], 2)
+        moved = (points.z[:, None] + s * np.eye(2) for s in (STEP, -STEP))
+        ahead, behind = (np.stack(self.white(*np.moveaxis(z, 2, 0)), axis=1) for z in moved)
+        index = np.tile(np.arange(2), (len(points.z), 1))
+        return Slopes([(ahead - behind) / (2 * STEP)], self.whites(points), index, 2)
 
     def fit(self, z, free=(True, True)):
         """Laplace's, round `z`; a pinned parameter stays at 0."""
@@ -87,35 +85,17 @@ CRESCENT: Any = Known(
 TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
 
 
-def test_a_normal_posterior_is_laplace_s():
-    known: Any = Known(lambda a, b: ((a - 1) / 0.1, (b + 0.5) / 0.3))
-    fit = known.fit((1 / 1.01, -0.5 / 1.09))
-    assert fit.log_evidence == pytest.approx(known.exact(), abs=1e-3)
-    assert weighed([fit], known, 0).log_evidence == pytest.approx(known.exact(), abs=AGREES_NATS)
+def log_mean(found):
+    """The evidence: the mean of the weights."""
+    return np.asarray(logsumexp(found.log_weights)) - np.log(len(found.z))
 
 
 @pytest.mark.parametrize(
-    ("known", "mode", "least_off"),
-    [(BENT, (0.3, 0.1), 0.05), (AT_THE_EDGE, (-0.8, 0.3), 0.15)],
-    ids=["bent", "at the edge"],
+    ("known", "mode"), [(BENT, (0.3, 0.1)), (AT_THE_EDGE, (-0.8, 0.3))], ids=["bent", "at the edge"]
 )
-def test_the_exact_one_where_laplace_is_off(known, mode, least_off):
-    fit, exact = known.best(mode), known.exact()
-    assert abs(fit.log_evidence - exact) > least_off
-    found = weighed([fit], known, 0, num=4096)
-    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
-
-
-def test_an_effect_that_does_not_show_may_be_anywhere():
-    fit, exact = UNSEEN.best((-1.6, -1.0)), UNSEEN.exact()
-    nothing = np.zeros(2, bool)
-    without = replace(fit, free=nothing, covariance=np.zeros((2, 2)), log_evidence=-(LEFT**2) / 2)
-    found = weighed([fit], UNSEEN, 0, without, num=4096)
-    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
-    alone = weighed([fit], UNSEEN, 0, num=4096)
-    assert found.log_evidence != alone.log_evidence
-    far_behind = replace(without, log_evidence=fit.log_evidence - 50.0)  # no draw from there
-    assert weighed([fit], UNSEEN, 0, far_behind, num=4096).log_evidence == alone.log_evidence
+def test_the_mean_of_the_weights_is_the_evidence(known, mode):
+    found = weighed([known.best(mode)], known, 0, num=4096)
+    assert log_mean(found) == pytest.approx(known.exact(), abs=AGREES_NATS)
 
 
 def test_a_draw_that_is_better_than_the_fit_is_told_of():
@@ -128,18 +108,15 @@ def test_a_draw_that_is_better_than_the_fit_is_told_of():
 def test_valleys_add_up_and_one_counts_once():
     near, far = TWO.best((0.99, 0.2)), TWO.best((-0.99, -0.2))
     both, one = weighed([near, far], TWO, 0, num=4096), weighed([near], TWO, 0, num=4096)
-    assert both.log_evidence == pytest.approx(TWO.exact(), abs=AGREES_NATS)
-    assert both.log_evidence - one.log_evidence == pytest.approx(np.log(2), abs=AGREES_NATS)
+    assert log_mean(both) == pytest.approx(TWO.exact(), abs=AGREES_NATS)
+    assert log_mean(both) - log_mean(one) == pytest.approx(np.log(2), abs=AGREES_NATS)
     twice = weighed([near, near], TWO, 0, num=4096)
-    assert twice.log_evidence == pytest.approx(one.log_evidence, abs=AGREES_NATS)
+    assert log_mean(twice) == pytest.approx(log_mean(one), abs=AGREES_NATS)
 
 
-def test_the_same_seed_gives_the_same_and_few_draws_say_that_they_are_few():
+def test_the_same_seed_gives_the_same_draws():
     fit = BENT.best((0.3, 0.1))
-    assert weighed([fit], BENT, 3).log_evidence == weighed([fit], BENT, 3).log_evidence
-    assert weighed([fit], BENT, 3).is_sure
-    narrow = replace(fit, covariance=fit.covariance * 1e-4)
-    assert not weighed([narrow], BENT, 3, num=12, most=12).is_sure
+    np.testing.assert_array_equal(weighed([fit], BENT, 3).z, weighed([fit], BENT, 3).z)
 
 
 @pytest.mark.parametrize("squeezed", [(0.4, 0.02), (0.1, 1.0)])
@@ -153,8 +130,7 @@ def test_further_draws_come_from_where_the_posterior_is(squeezed):
     )
     assert all(one.ess > ENOUGH_ESS for one in more)
     error, left = (
-        np.sqrt(np.mean([(one.log_evidence - exact) ** 2 for one in found]))
-        for found in (few, more)
+        np.sqrt(np.mean([(log_mean(one) - exact) ** 2 for one in found])) for found in (few, more)
     )
     assert left < 0.6 * error
 
@@ -180,20 +156,20 @@ def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(m
     nowhere = staticmethod(lambda z: np.full(len(z), -np.inf))
     monkeypatch.setattr(weighed_module._AlongValley, "log_density", nowhere)
     found = weighed([BENT.best((0.3, 0.1))], BENT, 0, num=4096)
-    assert found.log_evidence == pytest.approx(BENT.exact(), abs=AGREES_NATS)
+    assert log_mean(found) == pytest.approx(BENT.exact(), abs=AGREES_NATS)
 
 
 def test_a_crescent_is_followed_along_its_ridge(monkeypatch):
     """Draws beside a ridge count for nothing, and those in its middle know nothing of its ends."""
     fit, exact = CRESCENT.best((0.1, -0.2)), CRESCENT.exact()
     found = weighed([fit], CRESCENT, 0, num=512, most=512)
-    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
+    assert log_mean(found) == pytest.approx(exact, abs=AGREES_NATS)
     assert found.ess > 300
     weights = np.exp(found.log_weights - logsumexp(found.log_weights))
     mean = weights @ found.z[:, 0]
     assert np.sqrt(weights @ (found.z[:, 0] - mean) ** 2) == pytest.approx(0.298, rel=0.08)
     monkeypatch.setattr(weighed_module, "bent_direction", lambda valley: None)
-    blind = [weighed([fit], CRESCENT, seed, num=512, most=512).log_evidence for seed in range(12)]
+    blind = [log_mean(weighed([fit], CRESCENT, seed, num=512, most=512)) for seed in range(12)]
     off = np.median(np.array(blind) - exact)  # of the followed ones it is a thousandth
     assert off < -0.05, "a map of two powers does not follow it to its ends"
 

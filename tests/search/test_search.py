@@ -15,7 +15,7 @@ from galileo_jax.diagnosis.laws.fit_formulas import _with_laws
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
 from galileo_jax.diagnosis.laws.source import class_source, name_of
 from galileo_jax.diagnosis.stakes import VerdictStakes
-from galileo_jax.diagnosis.verdict import DECISIVE, LAPLACE_NATS, log_prior
+from galileo_jax.diagnosis.verdict import DECISIVE, log_prior
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import SETTLED_IN_TURN_NATS, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
@@ -170,7 +170,7 @@ def test_an_effect_that_was_missed_is_found_from_its_own_formula(rubs_at_low_spe
         found = search(table, 1, starts=beside_a_formula(table, law))
     (better,) = [one for one in found.named(1) if one.effects == ("stribeck",)]
     assert law.evidence_over(table.base) > 10.0  # it is there to be seen
-    assert better.fit.log_evidence > law.fit.log_evidence - LAPLACE_NATS
+    assert better.fit.log_evidence > law.fit.log_evidence - DECISIVE
     assert found.entries[frozenset(["stribeck"])].score_z == 7.0
 
 
@@ -182,7 +182,7 @@ def test_an_effect_that_was_missed_is_found_from_a_pair_that_has_it(rubs_at_low_
         table = table.with_entry(Entry(both, (both.fit,), 0.0))
         found = search(table, 2)
     (better,) = [one for one in found.named(1) if one.effects == ("stribeck",)]
-    assert better.fit.log_evidence > both.fit.log_evidence - LAPLACE_NATS
+    assert better.fit.log_evidence > both.fit.log_evidence - DECISIVE
 
 
 DECIDING_NATS = 12.8  # behind the best: what luck may make of 3 nats

@@ -21,7 +21,6 @@ from galileo_jax.diagnosis.laws.rank_formulas import (
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.importance_sampling import Weighed, weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
@@ -30,7 +29,6 @@ from galileo_jax.search.hypothesis import Hypothesis
 
 NUM_REFITTED = 3
 MOST_Z = 2.5
-SEED = 0  # of the rollouts that weigh evidence
 SAME_MOTION_NATS = 0.5  # by which no clip tells two motions apart
 SAME_EVIDENCE_NATS = 0.25  # by which neither of two laws is the more evident
 LEAST_FRICTION = 0.05  # a friction's strength is a share of its coefficient
@@ -79,7 +77,6 @@ def fitted_laws(
     views: Sequence[View],
     wanted: Collection[Shape] = (),
     on_stage: Callable[[str], None] = lambda _: None,
-    is_weighed: bool = False,
 ) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
@@ -93,17 +90,16 @@ def fitted_laws(
       views: of each clip, from `missing_force.views_of`.
       wanted: what is tried whatever the screening says of them.
       on_stage: told what is being done.
-      is_weighed: whether the evidence of the best is by rollouts, as that of its rivals.
     """
     found = suggestions(views, wanted)
     on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
-    made = _fitted(trials, near, found, views, is_weighed)
+    made = _fitted(trials, near, found, views)
     known = {name_of(law.structure) for law in made}
     if made:
         others = [*_simpler(made[0]), *of_family(views, made[0].structure.family)]
         new = [one for one in others if name_of(one.structure) not in known]
         on_stage(f"looking for a law: fitting the best formula in {len(new[:NUM_LAWS])} other ways")
-        made += _fitted(trials, near, new[:NUM_LAWS], views, is_weighed)
+        made += _fitted(trials, near, new[:NUM_LAWS], views)
     return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
 
 
@@ -159,7 +155,6 @@ def _fitted(
     near: Hypothesis,
     found: Sequence[Suggestion],
     views: Sequence[View],
-    is_weighed: bool,
 ) -> list[FittedLaw]:
     """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
@@ -181,17 +176,13 @@ def _fitted(
             owner.append(i)
     fits = fitter.fit_from(np.stack(starts), np.stack(free), np.array(owner))
     best = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
-    by_rollouts: dict[int, Weighed] = {}
     for i in best:
         fits[i] = max(fits[i], refit(fitter, fits[i]), key=lambda fit: fit.log_evidence)
-        own = weighed([fits[i]], fitter.residuals, SEED) if is_weighed else None
-        if own is not None and own.is_sure:
-            by_rollouts[i] = own
     made = [
         FittedLaw(
             one.structure,
             source,
-            Hypothesis((name_of(one.structure),), fit, extended, by_rollouts.get(i)),
+            Hypothesis((name_of(one.structure),), fit, extended),
             one.score,
         )
         for i, (one, source, fit) in enumerate(zip(found, sources, fits, strict=True))
