@@ -27,7 +27,7 @@ def number(value: float | None, sd: float | None, error: float = 0.0) -> str:
         places = min(places, -math.ceil(math.log10(error)))
     if value == sd:  # itself an uncertainty, which is never 0
         places = max(places, -math.floor(math.log10(sd)))
-    return f"{round(value, min(places, 9)):.{min(max(places, 0), 9)}f}"
+    return f"{round(value, min(places, 9)):z.{min(max(places, 0), 9)}f}"  # z: never -0.00
 
 
 def shown(entry: Mapping[str, Any], key: str = "mean") -> str:

@@ -16,6 +16,10 @@ def test_numbers_have_the_places_their_uncertainty_allows():
     assert number(0.25, 0.0) == "0.25"
 
 
+def test_what_rounds_to_zero_has_no_sign():
+    assert number(-0.001, 0.2) == "0.00"
+
+
 def test_a_digit_below_the_monte_carlo_error_is_not_shown():
     entry = {"mean": 0.151812, "sd": 0.00036, "mcse": {"mean": 1.1e-5, "sd": 0.9e-5}}
     assert shown(entry) == "0.1518"
