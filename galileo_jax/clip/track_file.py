@@ -137,7 +137,6 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         replace(table, position=table.position[..., first:]),
     )
     times, lost = with_lost_frames(path, times, table.position)
-    floor_m = tuple(0.0 if math.isnan(one) else one * metres for one in table.resolution)
     names = tuple(item.name for item in file.objects)
     said: tuple[str, ...] = ()
     if table.axes == ("angle",):
@@ -146,7 +145,7 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         start = table.position[0, 0, 0] if is_px else 0.0
         observation = along_line(
             yaml_path, path, file, table.axes[0], times, (table.position[:, 0] - start) * metres,
-            floor_m[0],
+            _rounding_m(table, metres)[0],
         )  # fmt: skip
     else:
         table, turned = in_plane(path, file, table)
@@ -154,8 +153,9 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         said = turned + told
         position = placed(file, table, metres, origin, y_axis, is_px)
         observation = _observation(
-            path, names, times, position, floor_m, is_nominal=is_px and scale is None
-        )
+            path, names, times, position, _rounding_m(table, metres),
+            is_nominal=is_px and scale is None,
+        )  # fmt: skip
     return FileTrack(
         observation,
         unit,
@@ -164,6 +164,11 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         origin_px=origin,
         warnings=table.warnings + warnings + lost + said + _doubts(yaml_path, path, table, fps),
     )
+
+
+def _rounding_m(table: TrackTable, metres: float) -> tuple[float, ...]:
+    """The unit in the last place of each axis, m; 0 where it is not known."""
+    return tuple(0.0 if math.isnan(one) else one * metres for one in table.resolution)
 
 
 OURS = re.compile(r"time_s|\w+_[xy]_m", re.IGNORECASE)
