@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.fields import short
-from galileo_jax.clip.lost_frames import with_lost_frames
+from galileo_jax.clip.lost_frames import lost_text, with_lost_frames
 from galileo_jax.clip.plane_noise import roughness_covariance_m2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
@@ -136,7 +136,8 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         times[first:] - times[first],
         replace(table, position=table.position[..., first:]),
     )
-    times, lost = with_lost_frames(path, times, table.position)
+    restored = with_lost_frames(times, table.position)
+    times, lost = restored, lost_text(path, times, restored)
     names = tuple(item.name for item in file.objects)
     said: tuple[str, ...] = ()
     if table.axes == ("angle",):

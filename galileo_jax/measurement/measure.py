@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.clip.lost_frames import lost_text, with_lost_frames
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -139,6 +140,12 @@ def measure(clip: Clip) -> Measurement:
     measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
+    if pixels is not None:
+        remarks.extend(
+            lost_text(
+                clip.path, np.array(clip.frame_times_s)[: len(pixels.times_s)], pixels.times_s
+            )
+        )
     segments = segment(measured.clip, measured.observation, pixels)
     remarks.extend(f"{clip.path}: {each}" for each in segments.cuts)
     observation = segments.used(measured.observation)
@@ -239,6 +246,9 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         )
         return _as_declared(clip, observation), None
     pixels = track_once(clip)
+    seen = np.where(pixels.is_visible[..., None], pixels.position_px, np.nan)
+    times_s = with_lost_frames(pixels.times_s, np.moveaxis(seen, 1, 2))
+    pixels = replace(pixels, times_s=times_s)
     observation = with_errors_at_rest(observe(clip, pixels))
     observation = with_coding_errors(clip, observation, pixels)
     observation = with_camera_modes(clip, observation, pixels)

@@ -64,8 +64,8 @@ def with_silhouette(
     one, but for what is round, whose middle it becomes. Otherwise it becomes the silhouette's
     middle. If a smooth path leads to that from where the texture was last seen (it was held until
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
-    they are apart is then an unknown shift of the silhouette. Of a texture that hardly moves while a
-    silhouette sets out from it, the first frame alone counts: it is of the scene behind.
+    they are apart is then an unknown shift of the silhouette. Of a texture that hardly moves while
+    a silhouette sets out from it, the first frame alone counts: it is of the scene behind.
 
     Args:
       found: by texture.
