@@ -77,7 +77,8 @@ def propose(
       InputError: the video does not decode, nothing moves in it, or the camera does.
       Cancelled: `cancel` was set.
 
-    Limits: objects without texture, or that are not there in the first frame, are not found.
+    Limits: objects that are not there in the first frame are not found, nor those without texture
+    beside one with it.
     """
     path = Path(video)
     with progress.scope(on_progress, cancel):
@@ -94,6 +95,7 @@ def propose(
             movers = find_movers(open_frames, SPAN_PX, advance=advance)
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None
+        movers = [mover for mover in movers if not mover.first_frame]
         movers = [mover for mover in movers if not mover.leaves_picture][:2] or movers[:1]
         if not movers:
             raise InputError(f"{path}: nothing moves in it; mark the objects by hand")

@@ -1,4 +1,4 @@
-"""Frames that are missing in a table whose rows were numbered without a gap.
+"""Frames that are missing in a table or film whose rows were numbered without a gap.
 
 Where a frame was lost, a body that moves smoothly makes a step of twice the usual length, once. The
 step between rows i and i + 1, in units of what its neighbours let expect, is 1 + (frames lost).
@@ -21,37 +21,49 @@ NEIGHBOURS = 2
 """Steps on either side of a jump, which must be there and alike."""
 
 
-def with_lost_frames(
-    path: Path, times: np.ndarray, position: np.ndarray
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Times `[row]` with the time of lost frames put back, and which were lost.
+def with_lost_frames(times: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Times `[row]` with the time of lost frames put back.
+
+    Args:
+      times: `[row]`, s.
+      position: `[object, axis, row]`, in any unit; NaN where it is not seen.
+
+    Limits: one object, seen in every row from the first to the last, in equal steps of time.
+    """
+    seen = np.flatnonzero(np.isfinite(position).all(axis=(0, 1)))
+    steps = np.diff(times)
+    is_even = len(seen) >= LEAST_ROWS and np.ptp(steps) <= 0.1 * np.median(steps)
+    if len(position) != 1 or not is_even or len(seen) <= seen[-1] - seen[0]:
+        return times
+    place, rows = position[0][:, seen], times[seen]
+    lost: dict[int, int] = {}
+    for _ in range(4):  # with more of them known, the errors of the others are known better
+        found = _lost_after(_restored(rows, lost), place, lost)
+        if found == lost:
+            break
+        lost = found
+    if not lost or not _is_even_elsewhere(place, lost):
+        return times
+    return _restored(times, {int(seen[0]) + row: count for row, count in lost.items()})
+
+
+def lost_text(path: Path, times: np.ndarray, restored: np.ndarray) -> tuple[str, ...]:
+    """Which frames were lost, a line; nothing where none were.
 
     Args:
       path: named in what is said.
       times: `[row]`, s.
-      position: `[object, axis, row]`, in any unit.
-
-    Limits: one object, seen in every row, in equal steps of time.
+      restored: the same `with_lost_frames`.
     """
-    steps = np.diff(times)
-    is_even = len(times) >= LEAST_ROWS and np.ptp(steps) <= 0.1 * np.median(steps)
-    if len(position) != 1 or not is_even or not np.isfinite(position).all():
-        return times, ()
-    lost: dict[int, int] = {}
-    for _ in range(4):  # with more of them known, the errors of the others are known better
-        restored = _restored(times, lost)
-        found = _lost_after(restored, position[0], lost)
-        if found == lost:
-            break
-        lost = found
-    if not lost or not _is_even_elsewhere(position[0], lost):
-        return times, ()
-    listed = [f"{row}" + (f" ({count})" if count > 1 else "") for row, count in lost.items()]
-    said = (
+    lost = np.round((np.diff(restored) - np.diff(times)) / np.median(np.diff(times))).astype(int)
+    if not lost.any():
+        return ()
+    after = np.flatnonzero(lost)
+    listed = [f"{row}" + (f" ({lost[row]})" if lost[row] > 1 else "") for row in after]
+    return (
         f"{path}: frames are missing after rows {', '.join(listed)}, counted from 0, where it "
-        "jumps by whole steps; their time is put back"
+        "jumps by whole steps; their time is put back",
     )
-    return _restored(times, lost), (said,)
 
 
 def _restored(times: np.ndarray, lost: dict[int, int]) -> np.ndarray:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.fields import short
-from galileo_jax.clip.lost_frames import with_lost_frames
+from galileo_jax.clip.lost_frames import lost_text, with_lost_frames
 from galileo_jax.clip.plane_noise import roughness_covariance_m2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
@@ -136,8 +136,8 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         times[first:] - times[first],
         replace(table, position=table.position[..., first:]),
     )
-    times, lost = with_lost_frames(path, times, table.position)
-    floor_m = tuple(0.0 if math.isnan(one) else one * metres for one in table.resolution)
+    restored = with_lost_frames(times, table.position)
+    times, lost = restored, lost_text(path, times, restored)
     names = tuple(item.name for item in file.objects)
     said: tuple[str, ...] = ()
     if table.axes == ("angle",):
@@ -146,7 +146,7 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         start = table.position[0, 0, 0] if is_px else 0.0
         observation = along_line(
             yaml_path, path, file, table.axes[0], times, (table.position[:, 0] - start) * metres,
-            floor_m[0],
+            _rounding_m(table, metres)[0],
         )  # fmt: skip
     else:
         table, turned = in_plane(path, file, table)
@@ -154,8 +154,9 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         said = turned + told
         position = placed(file, table, metres, origin, y_axis, is_px)
         observation = _observation(
-            path, names, times, position, floor_m, is_nominal=is_px and scale is None
-        )
+            path, names, times, position, _rounding_m(table, metres),
+            is_nominal=is_px and scale is None,
+        )  # fmt: skip
     return FileTrack(
         observation,
         unit,
@@ -164,6 +165,11 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         origin_px=origin,
         warnings=table.warnings + warnings + lost + said + _doubts(yaml_path, path, table, fps),
     )
+
+
+def _rounding_m(table: TrackTable, metres: float) -> tuple[float, ...]:
+    """The unit in the last place of each axis, m; 0 where it is not known."""
+    return tuple(0.0 if math.isnan(one) else one * metres for one in table.resolution)
 
 
 OURS = re.compile(r"time_s|\w+_[xy]_m", re.IGNORECASE)

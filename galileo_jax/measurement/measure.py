@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.clip.lost_frames import lost_text, with_lost_frames
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -36,7 +37,7 @@ from galileo_jax.measurement.segments.segments import (
     cuts_of,
     segment,
 )
-from galileo_jax.measurement.segments.start_speed import on_ramp, start_speed
+from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
 from galileo_jax.measurement.shared_errors import beside, with_errors
 from galileo_jax.measurement.track_cache import track_once
@@ -139,6 +140,12 @@ def measure(clip: Clip) -> Measurement:
     measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
+    if pixels is not None:
+        remarks.extend(
+            lost_text(
+                clip.path, np.array(clip.frame_times_s)[: len(pixels.times_s)], pixels.times_s
+            )
+        )
     segments = segment(measured.clip, measured.observation, pixels)
     remarks.extend(f"{clip.path}: {each}" for each in segments.cuts)
     observation = segments.used(measured.observation)
@@ -209,8 +216,11 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, remarks: l
         return clip.model_copy(update={"starts_moving": True})
     if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
         return clip
-    found = start_speed(on_ramp(observation) if scenario.has_table else observation)
+    seen = on_ramp(observation) if scenario.has_table else observation
+    found, name = start_speed(seen), clip.objects[0].name
     if found is None:
+        if clip.scenario == "ramp" and clip.objects[0].first_frame is not None:
+            remarks.extend(_resting(clip, rest_s(seen)))
         return clip
     how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
     what_then = (
@@ -218,11 +228,22 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, remarks: l
         if scenario.has_table
         else "its speed there is inferred (`starts_moving: false` if it is at rest there)"
     )
-    name = clip.objects[0].name
     remarks.append(
         f"{clip.path}: {name} moves already in the first frame that is used{how_fast}; {what_then}"
     )
     return clip if scenario.has_table else clip.model_copy(update={"starts_moving": True})
+
+
+def _resting(clip: Clip, rests_s: float | None) -> tuple[str, ...]:
+    """That object 1 is let go later than in its first frame, a line; nothing where it is not."""
+    if rests_s is None:
+        return ()
+    name, first = clip.objects[0].name, clip.objects[0].first_frame
+    return (
+        f"{clip.path}: {name} rests for {rests_s:.2g} s from frame {first} on, where it "
+        "is declared to be let go; write `first_frame: null` for it, which takes the release from "
+        "the motion, or try the effect release_delay",
+    )
 
 
 def observed(clip: Clip) -> tuple[Observation, Track | None]:
@@ -239,6 +260,9 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         )
         return _as_declared(clip, observation), None
     pixels = track_once(clip)
+    seen = np.where(pixels.is_visible[..., None], pixels.position_px, np.nan)
+    times_s = with_lost_frames(pixels.times_s, np.moveaxis(seen, 1, 2))
+    pixels = replace(pixels, times_s=times_s)
     observation = with_errors_at_rest(observe(clip, pixels))
     observation = with_coding_errors(clip, observation, pixels)
     observation = with_camera_modes(clip, observation, pixels)

@@ -15,6 +15,7 @@ from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_numbe
 from galileo_jax.table.titles import Title, title_of, unit_of
 
 MULTI = "multi:"
+AXES = ("x", "y", "z")
 RATES = ("frequency", "fps", "frame rate", "framerate", "sampling rate")
 MARKERS = "marker_names"
 """Motion capture: three columns for each of the names that follow."""
@@ -79,7 +80,9 @@ def split_heading(path: Path, rows: Rows) -> Heading:
         _refuse_longer(path, body, used[1], named, titles)
     units = next((row for _, row in above if _is_units(row)), [])
     over = [
-        row for line, row in above[: max(at, 0)] if not _is_units(row) and line not in commented
+        row
+        for line, row in above[: max(at, 0)]
+        if not (_is_units(row) or line in commented or _is_titles_again(row, titles))
     ]
     names = _names(over, width)
     meanings = []
@@ -100,6 +103,12 @@ def _num_titles(row: list[str]) -> int:
     if _is_units(row) or _has_number(row):
         return 0
     return sum(bool(title_of(cell).role) for cell in row)
+
+
+def _is_titles_again(row: list[str], titles: list[str]) -> bool:
+    """Whether a row has the same titles in other words (TrackMate), two axes at least."""
+    pairs = ((title_of(a).role, title_of(b).role) for a, b in zip(row, titles, strict=False))
+    return sum(one == other and one in AXES for one, other in pairs) > 1
 
 
 def _is_value(cell: str) -> bool:

@@ -17,6 +17,7 @@ from galileo_jax.table.heading import Heading, split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
     motion_starts,
+    not_pasted,
     unrounded,
     without_copies,
     without_repeats,
@@ -59,9 +60,14 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
     times, frames, resolution_s = _clock(path, heading, columns, lines)
     names, axes, places, resolution = _places(path, heading, columns)
     unit = _unit(path, heading, columns)
-    warnings = list(columns.warnings)
-    if ids := columns.of("object"):
-        clock = frames if times is None else times
+    warnings, ids = list(columns.warnings), columns.of("object")
+    clock = frames if times is None else times
+    if clock is not None and not ids:
+        new, said = not_pasted(path, clock, places, lines)
+        times, frames = (None if one is None else one[new] for one in (times, frames))
+        places, lines = places[..., new], [lines[row] for row in new]
+        warnings += said
+    if ids:
         if clock is None:
             raise InputError(
                 f"{path}: a column of particles needs one of frames or times beside it"

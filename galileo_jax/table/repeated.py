@@ -1,6 +1,7 @@
 """Rows with the same time or a copied place, and times that begin anew: motions in one table."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,29 @@ def without_repeats(
     )
     said = f"{path}: line {first}: {int(repeats.sum())} times stand in several rows, {how}"
     return times[starts], mean, [said]
+
+
+def not_pasted(
+    path: Path, clock: np.ndarray, places: np.ndarray, lines: Sequence[int]
+) -> tuple[np.ndarray, list[str]]:
+    """The rows that are in a table for the first time, counted from 0, and what was done.
+
+    Rows from which the clock has gone back were pasted again where they are rows of before to the
+    last digit, until the table ends, the clock goes back once more, or goes on beyond all before.
+    """
+    is_new = np.ones(len(clock), bool)
+    starts = (1 + np.flatnonzero(np.diff(clock) < 0)).tolist()
+    rows = [row.tobytes() for row in np.vstack([clock, places.reshape(-1, len(clock))]).T + 0.0]
+    known, latest = set(rows[: starts[0]] if starts else ()), np.maximum.accumulate(clock)
+    for start, stop in pairwise([*starts, len(clock)]):
+        end = next((row for row in range(start, stop) if rows[row] not in known), stop)
+        is_new[start:end] = end < stop and clock[end] <= latest[start - 1]
+        known.update(rows[end:stop])
+    new = np.flatnonzero(is_new)
+    if is_new.all():
+        return new, []
+    first, count = lines[int(is_new.argmin())], len(clock) - len(new)
+    return new, [f"{path}: line {first}: {count} rows are rows of before once more; left out"]
 
 
 def without_copies(

@@ -103,9 +103,10 @@ def _with_points(
     first = grey(next(open_frames()))
     found: dict[str, ClipObject] = {}
     for item, mover in zip(missing, movers, strict=False):
-        marked = item.model_copy(update={"point_px": mover.point_px, "first_frame": 0})
+        found_at = {"point_px": mover.point_px, "first_frame": mover.first_frame}
+        marked = item.model_copy(update=found_at)
         outline = outline_of(clip, marked)
-        if outline.size_px is not None and not outline.is_round:
+        if outline.size_px is not None and not outline.is_round and mover.num_features:
             centre = fit_outline(first, mover.places_px, outline)
             marked = marked.model_copy(update={"point_px": centre})
         found[item.name] = marked

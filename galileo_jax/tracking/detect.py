@@ -2,7 +2,8 @@
 
 Features of the first frame are followed through the whole video. Those that set out together,
 from places close to each other, and keep going the same way are one thing. A thing that leaves
-the picture is a hand; of the others the first to move is object 1.
+the picture is a hand; of the others the first to move is object 1. Where no features do, as those
+of a small ball in flight, it is the silhouette that goes farthest.
 """
 
 from collections.abc import Callable, Iterable
@@ -14,6 +15,7 @@ import numpy as np
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.lucas_kanade import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
+from galileo_jax.tracking.silhouette import Path, paths_of
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
@@ -29,6 +31,8 @@ MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03
 """Share of the frame's width within which a thing counts as at the border."""
+LEAST_SEEN = 6
+"""Frames in which a silhouette is followed: fewer may be linked by chance."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +40,13 @@ class Mover:
     """A thing that moves.
 
     Attributes:
-      point_px: middle of its features in the first frame, `(x, y)`.
+      point_px: middle of its features in the first frame in which it is seen, `(x, y)`.
       onset_frame: when it had moved by `MOVED_PX`.
-      num_features: how many features agree on it.
+      num_features: how many features agree on it; 0 of a silhouette.
       leaves_picture: whether its features were last seen going over the border.
-      places_px: `[feature, 2]`, the features in the first frame.
+      places_px: `[feature, 2]`, the features in that frame; of a silhouette two corners.
       goes_right: whether its features were last seen to the right of where they began.
+      first_frame: in which it is seen.
     """
 
     point_px: tuple[float, float]
@@ -50,6 +55,7 @@ class Mover:
     leaves_picture: bool
     places_px: np.ndarray
     goes_right: bool = True
+    first_frame: int = 0
 
 
 class CameraMovesError(InputError):
@@ -66,7 +72,8 @@ def find_movers(
     """The things that move, those that stay in the picture first, each kind by onset.
 
     Args:
-      open_frames: gives the frames from the beginning; called once.
+      open_frames: gives the frames from the beginning; called once, or three times where no
+        features move.
       span_px: about the size of an object; features farther apart are linked by others only.
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle); their
         middle is taken along these axes.
@@ -75,7 +82,7 @@ def find_movers(
     Raises:
       CameraMovesError: the whole picture moves, so that nothing says what is in motion.
 
-    Limits: things without texture, or that are not there in the first frame, are not found.
+    Limits: beside a thing with texture, those without, or that come later, are not found.
     """
     path, size_px = _feature_paths(open_frames, advance)
     moved = np.linalg.norm(path - path[:1], axis=2) > MOVED_PX
@@ -100,7 +107,33 @@ def find_movers(
                 goes_right=bool(np.median(last[:, 0] - path[0, members, 0]) >= 0),
             )
         )
+    if not movers:
+        return _silhouettes(open_frames, len(path))
     return sorted(movers, key=lambda mover: (mover.leaves_picture, mover.onset_frame))
+
+
+def _silhouettes(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> list[Mover]:
+    """The thing whose silhouette goes farthest, by more than its size; empty: there is none."""
+
+    def way_px(path: Path) -> float:
+        return float(np.hypot(*np.ptp(path.places_px, axis=0)))
+
+    paths = [one for one in paths_of(open_frames, np.arange(count)) if len(one.parts) >= LEAST_SEEN]
+    found = max(paths, key=way_px, default=None)
+    if found is None or way_px(found) < found.parts[0].size_px:
+        return []
+    place, first = found.places_px, found.parts[0]
+    return [
+        Mover(
+            point_px=(float(place[0, 0]), float(place[0, 1])),
+            onset_frame=found.frames[0],
+            num_features=0,
+            leaves_picture=False,
+            places_px=np.stack([first.low_px, first.high_px]).astype(float),
+            goes_right=bool(place[-1, 0] >= place[0, 0]),
+            first_frame=found.frames[0],
+        )
+    ]
 
 
 def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:

@@ -24,6 +24,9 @@ agree to this, in pixels or by the object's size."""
 INSIDE, BESIDE = 0.5, 2.0
 """A silhouette is the object's if its middle is within this share of its size of where the texture
 is, or if it begins within so many sizes of where that was last seen."""
+STAYS_PX, FARTHER = 20.0, 3.0
+"""What is followed and goes less far may be what is behind a smeared object: it is if a silhouette
+sets out from there and goes so many times as far."""
 ON_OBJECT = 0.3
 """Standard deviation per axis of a point somewhere on an object about its middle, by its size: of a
 square's points 1 / sqrt(12)."""
@@ -44,7 +47,12 @@ def needs_silhouette(found: Finished, start: Start) -> bool:
     seen = np.isfinite(found.angle_rad)
     wanted = np.array([start.uses(index) for index in range(len(seen))])
     is_lost = (wanted & ~seen).sum() > LOST_SHARE * wanted.sum()
-    return bool(is_lost or _turns(found, start))
+    return bool(is_lost or _turns(found, start) or _stays(found, seen))
+
+
+def _stays(found: Finished, seen: Bool[np.ndarray, " frame"]) -> bool:
+    """Whether what is followed hardly moves."""
+    return bool(seen.any()) and _way_px(found.position_px[seen]) < STAYS_PX
 
 
 def with_silhouette(
@@ -56,7 +64,8 @@ def with_silhouette(
     one, but for what is round, whose middle it becomes. Otherwise it becomes the silhouette's
     middle. If a smooth path leads to that from where the texture was last seen (it was held until
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
-    they are apart is then an unknown shift of the silhouette.
+    they are apart is then an unknown shift of the silhouette. Of a texture that hardly moves while
+    a silhouette sets out from it, the first frame alone counts: it is of the scene behind.
 
     Args:
       found: by texture.
@@ -65,6 +74,11 @@ def with_silhouette(
       clock: when each frame was taken, in usual steps.
     """
     seen = np.isfinite(found.angle_rad)
+    if _stays(found, seen):
+        first, way = np.arange(len(seen)) == int(seen.argmax()), _way_px(found.position_px[seen])
+        far = [path for path in paths if _way_px(path.places_px) > FARTHER * way]
+        if any(_is_own(path, found.position_px, first, start) for path in far):
+            seen = first
     own = [path for path in paths if _is_own(path, found.position_px, seen, start)]
     if not own:
         return found

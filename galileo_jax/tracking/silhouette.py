@@ -32,6 +32,9 @@ SAME_AREA = 1.5
 """From a frame to the next an object's silhouette grows or shrinks by less."""
 OFF_SIZE, OFF_STEP = 0.6, 0.35
 """How far a part may be from where a path leads, by its size and by the way it goes."""
+MOST_AT_FIRST = 4.0
+"""By so many of its sizes a thing is at most gone in the frame after the one that shows it first: a
+ball of 15 pixels by 60."""
 MOST_MISSED = 4.0
 """Usual steps for which a path may be hidden."""
 TURN_BACK = 1.3
@@ -101,7 +104,7 @@ class Path:
         off = float(np.hypot(*(part.centre_px - self.expected(now))))
         back = float(np.hypot(*(part.centre_px - last.centre_px)))
         if len(self.parts) == 1:  # nobody knows how fast it is
-            return back / (2 * last.size_px)
+            return back / (MOST_AT_FIRST * last.size_px)
         near = off / (OFF_SIZE * last.size_px + OFF_STEP * way)
         # What is thrown back is nearer to where it was than its way.
         return min(near, 0.5 + 0.5 * back / (TURN_BACK * way + OFF_SIZE * last.size_px))

@@ -6,7 +6,8 @@ In a whole picture rows two apart differ more than neighbours (R 1.2 to 2; 1 of 
 odd and even rows were taken at two times, what moves is a comb, and rows two apart are of one time
 (R .3 to .8). What files say of themselves is often wrong, and FFmpeg's `idet` weighs the whole
 picture, in which something small that moves counts for nothing. Which field is first: the later one
-of a picture is nearer to the earlier one of the next.
+of a picture is nearer to the earlier one of the next, also where what moves has gone by more than
+its size, if what differs is blurred.
 
 Limits: what moves by less than a pixel from field to field makes no comb.
 """
@@ -22,30 +23,35 @@ MOVED_GREY = 12
 LEAST_PIXELS = 200
 """That moved, in the whole film; fewer tell nothing."""
 
+BLUR = 8
+"""Of the picture's sides, the share over which fields are blurred before they are compared."""
+
+COLUMNS = 4
+"""Of so many columns one is enough to tell which field is first."""
+
 Rows = Float[np.ndarray, "sum"]
 NO_ROWS: Rows = np.zeros(5)
 
 
 def rows_of(before: UInt8[np.ndarray, "row column"], grey: UInt8[np.ndarray, "row column"]) -> Rows:
-    """Sums over moved pixels, to be added up over a film; `first_field` reads them.
+    """Sums over pixels, to be added up over a film; `first_field` reads them.
 
     Returns:
-      differences of rows two apart and of neighbours; those to the picture before of this one's
-      upper field (from the lower one there) and of its lower field (from the upper one there); the
-      number of pixels.
+      differences of rows two apart and of neighbours; those, blurred, to the picture before of this
+      one's upper field (from the lower one there) and of its lower field (from the upper one
+      there); the number of pixels.
     """
     if before.shape != grey.shape or len(grey) < 4:
         return NO_ROWS
     moved = cv2.threshold(cv2.absdiff(grey, before), MOVED_GREY, 255, cv2.THRESH_BINARY)[1]
     even = len(grey) // 2 * 2
     upper, lower = grey[0:even:2], grey[1:even:2]
-    fields = moved[0:even:2]
     return np.array(
         [
             _sum(grey[:-2], grey[2:], moved[:-2]),
             _sum(grey[:-2], grey[1:-1], moved[:-2]),
-            _sum(before[1:even:2], upper, fields),
-            _sum(before[0:even:2], lower, fields),
+            _blurred(before[1:even:2], upper),
+            _blurred(before[0:even:2], lower),
             cv2.countNonZero(moved),
         ]
     )
@@ -62,3 +68,9 @@ def first_field(rows: Rows) -> str | None:
 def _sum(one: np.ndarray, other: np.ndarray, moved: np.ndarray) -> float:
     differs = cv2.absdiff(one, other)
     return float(cv2.sumElems(cv2.bitwise_and(differs, moved))[0])
+
+
+def _blurred(one: np.ndarray, other: np.ndarray) -> float:
+    differs = cv2.subtract(one[:, ::COLUMNS].copy(), other[:, ::COLUMNS].copy(), dtype=cv2.CV_32F)
+    height, width = differs.shape
+    return cv2.norm(cv2.blur(differs, (width // BLUR + 1, height // BLUR + 1)), cv2.NORM_L1)

@@ -64,6 +64,20 @@ def test_a_flight_needs_two_coordinates(tmp_path: Path) -> None:
         observed(tmp_path, {"t (s)": T, "y (m)": FALL}, "scenario: flight")
 
 
+def test_a_third_axis_is_left_out_with_its_rounding(tmp_path: Path) -> None:
+    columns = {"t (s)": T, "X (m)": 0.9 * T, "Y (m)": 0.2 + NOISE[1], "Z (m)": FALL}
+    found = observed(tmp_path, columns, "scenario: flight\ntrack_up: z")
+    np.testing.assert_allclose(found.position_m[0], [0.9 * T, FALL], atol=1e-6)
+
+
+def test_a_pendulum_that_is_seen_from_below_swings_along_x_alone(tmp_path: Path) -> None:
+    swing = 0.2 + 0.1 * np.cos(9.0 * T) + NOISE[0]
+    found = observed(tmp_path, {"t (s)": T, "x (m)": swing}, "scenario: pendulum")
+    np.testing.assert_allclose(np.abs(found.position_m[0, 0]), swing, atol=1e-6)
+    assert (np.sqrt(found.covariance_m2[0, 1, 1]) == UNMEASURED_SD_M).all()
+    np.testing.assert_array_equal(np.abs(found.across[0, 1]), 1.0)
+
+
 def test_first_frame_is_honoured(tmp_path: Path) -> None:
     rows = "\n".join(f"{t:.4f},{x:.6f},{y:.6f}" for t, x, y in zip(T, T, FALL, strict=True))
     (tmp_path / "a.csv").write_text("t (s),x (m),y (m)\n" + rows + "\n")

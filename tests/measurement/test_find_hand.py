@@ -45,6 +45,16 @@ def test_a_throw_begins_when_the_hand_is_off(fps: float, drag_per_m: float) -> N
     assert abs(times[first] - 0.16) <= max(0.05, 2.5 / fps)
 
 
+@pytest.mark.parametrize("noise_m", [3e-4, 5e-4, 8e-4])
+def test_no_frame_of_the_hand_is_left(noise_m: float) -> None:
+    """One that is would make gravity 1 % less."""
+    times, place = thrown(60.0, hand_s=0.16)
+    place = np.concatenate([np.repeat(place[:, :1], 12, axis=1), place], axis=1)
+    times = np.concatenate([np.arange(-12, 0) / 60, times])
+    first = thrown_frame(seen(times, place, noise_m), rest_belongs=False)
+    assert first is not None and 22 <= first <= 24
+
+
 @pytest.mark.parametrize("drag_per_m", [0.0, 0.02, 0.15])
 @pytest.mark.parametrize("noise_m", [1e-5, 3e-3])
 def test_what_flies_from_the_first_frame_is_left_whole(drag_per_m: float, noise_m: float) -> None:

@@ -179,6 +179,24 @@ def test_a_row_for_each_particle(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.delete(table.position[1, 0], 3), np.delete(truth()[1] + 7, 3))
 
 
+def test_titles_in_several_forms_above_each_other_are_no_names(tmp_path: Path) -> None:
+    """As TrackMate writes them: for programs, for people, in short, and units."""
+    heading = (
+        "LABEL,ID,TRACK_ID,POSITION_X,POSITION_Y,POSITION_T,FRAME",
+        "Label,Spot ID,Track ID,X,Y,T,Frame",
+        "Label,Spot ID,Track ID,X,Y,T,Frame",
+        ",,,(mm),(mm),(sec),",
+    )
+    body = [
+        f"ID{2 * n + k},{2 * n + k},{k},{x + k},{y},{t},{n}"
+        for n, (t, x, y) in enumerate(truth().T)
+        for k in (0, 1)
+    ]
+    table = read(tmp_path, text(*heading, body=body))
+    assert table.names == ("0", "1") and table.unit == "mm"
+    check(table)
+
+
 def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None:
     body = [f"{t},{x},{y},{x + 1},{y}" for t, x, y in truth().T]
     for heading in (
@@ -228,6 +246,22 @@ def test_two_places_at_one_time_are_their_mean_and_said(tmp_path: Path) -> None:
     assert table.position[0, 0, 4] == pytest.approx(x + 0.01)
     assert table.position.shape[-1] == ROWS
     assert "line 6: 1 times stand in several rows, 1 of them with other places" in table.warnings[0]
+
+
+@pytest.mark.parametrize("again", [slice(None), slice(4, 9), slice(9, None)])
+def test_rows_that_were_pasted_again_count_once(again: slice, tmp_path: Path) -> None:
+    body = lines()
+    at = len(body) if again.stop is None else again.stop
+    table = read(tmp_path, text("t,x,y", body=[*body[:at], *body[again][:at], *body[at:]]))
+    check(table)
+    assert table.starts == (0,)
+    assert f"line {at + 2}: {len(body[again])} rows are rows of before" in table.warnings[0]
+
+
+def test_two_motions_that_begin_alike_are_two(tmp_path: Path) -> None:
+    other = [row if n < 5 else f"{row.rpartition(',')[0]},0.5" for n, row in enumerate(lines())]
+    table = read(tmp_path, text("t,x,y", body=[*lines(), *other]))
+    assert table.starts == (0, ROWS) and not table.warnings
 
 
 def spreadsheet(rows: list[list[str]]) -> bytes:

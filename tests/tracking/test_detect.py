@@ -38,6 +38,19 @@ def test_nothing_that_moves_gives_nothing():
     assert find_movers(lambda: iter(frames), 32) == []
 
 
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_small_ball_in_fast_flight_is_found_by_its_silhouette(first: int):
+    """It goes by 2.5 of its sizes a frame, and may come into the picture later."""
+    time = np.arange(12.0)
+    zero = 0 * time
+    flight = np.stack([25 + 24.0 * (time - first), 120 - 26 * time + 2.2 * time**2, zero], axis=1)
+    flight[time < first, 0] = -100
+    frames = film([(Box((10, 10), seed=3), flight)], size_px=(320, 160))
+    (mover,) = find_movers(lambda: iter(frames), 32)
+    assert mover.first_frame == first and mover.goes_right and not mover.num_features
+    np.testing.assert_allclose(mover.point_px, flight[first, :2], atol=1.5)
+
+
 def test_outline_is_moved_to_the_sharp_sides():
     pose = np.array([80.4, 60.2, 0.3])
     image = grey(film([(FIRST, pose[None])])[0])

@@ -1,5 +1,6 @@
 """Objects that their texture does not show well: plain, smeared, turning, thrown back."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -75,6 +76,17 @@ def test_a_fast_smeared_ball_that_bounces_is_followed():
     # In the frames about the bounce the velocity is not that of any moment.
     sd = np.sqrt(np.einsum("fii->f", track.covariance_px2[0]))
     assert sd[5:7].max() > 3 * np.nanmedian(sd)
+
+
+def test_a_smear_is_followed_and_not_what_is_behind_it():
+    path = np.stack([np.full(7, 80.0), 25 + 42.0 * np.arange(7)], axis=1)
+    rng = np.random.default_rng(3)
+    ground = cv2.resize(rng.normal(0, 25, (80, 40)), SIZE_PX, interpolation=cv2.INTER_CUBIC)
+    frames = [np.clip(one + ground, 0, 255).astype(np.uint8) for one in film(path, share=0.9)]
+    track = tracked(frames, path[0])
+    seen = track.is_visible[0]
+    assert seen.sum() >= 6
+    assert np.abs(track.position_px[0][seen] - path[seen]).max() < 3
 
 
 @pytest.mark.parametrize("click", [(0.0, 0.0), (1.0, 0.0), (0.0, -1.0), (2.0, 2.0)])

@@ -2,6 +2,7 @@ import os
 import tracemalloc
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 from galileo_jax.video.decode import frames, probe
+from galileo_jax.video.weave import first_field, rows_of
 from tests.video.make_video import (
     with_index_first,
     with_uneven_frames,
@@ -189,6 +191,20 @@ def test_what_an_edit_list_hides_is_not_there(tmp_path: Path) -> None:
     info = probe(path)
     assert (info.frame_count, info.warnings) == (17, ())
     assert middle_of(next(frames(path)))[0] == pytest.approx(30 + 4 * 7, abs=0.5)
+
+
+@pytest.mark.parametrize("first", ["tff", "bff"])
+@pytest.mark.parametrize("step_px", [3, 20, 30])
+def test_the_first_field_shows_however_far_things_go(first: str, step_px: int) -> None:
+    """By as many as three of the ball's radii from field to field."""
+    rng, pictures = np.random.default_rng(2), []
+    for index in range(0, 14, 2):
+        one, other = (disc_at(30 + step_px * k, 60, (480, 120)) for k in (index, index + 1))
+        woven = (one if first == "tff" else other)[..., 0].copy()
+        woven[1::2] = (other if first == "tff" else one)[1::2, :, 0]
+        pictures.append((woven + rng.normal(0, 2, woven.shape)).clip(0, 255).astype(np.uint8))
+    rows = sum(rows_of(*pair) for pair in pairwise(pictures))
+    assert first_field(rows) == first
 
 
 @pytest.mark.parametrize("is_said", [True, False])

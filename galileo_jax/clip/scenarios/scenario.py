@@ -20,8 +20,8 @@ class Scenario:
       num_objects: (fewest, most) objects; None means no upper limit.
       is_level: objects slide on a level table that is seen from above.
       moves_in_plane: the path bends freely; False: it is straight, or a ramp and a table.
-      line: the straight line that the motion is along, for which one coordinate is enough:
-        "down", "slope" or "level"; None: it is along none.
+      line: the straight line that the motion is along, or is told by, for which one coordinate is
+        enough: "down", "slope", "level" or "aside"; None: it needs two.
       up_shows: what of a path tells which way is up: "bend" (it falls), "sag" (it hangs) or
         "drop" (it ends lower); None: nothing.
       laws: names of the laws of motion that are always there (`effects/laws/`).
@@ -38,7 +38,7 @@ class Scenario:
     has_table: bool = False
     is_level: bool = False
     moves_in_plane: bool = False
-    line: Literal["down", "slope", "level"] | None = None
+    line: Literal["down", "slope", "level", "aside"] | None = None
     up_shows: Literal["bend", "sag", "drop"] | None = None
     laws: tuple[str, ...] = ()
     without: tuple[str, ...] = ()

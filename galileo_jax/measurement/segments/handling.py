@@ -129,10 +129,11 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
             break
         size *= 2  # so short a window does not tell the acceleration
     first = held + size if held >= 0 else 0
-    free = slice(first, min(first + max(2 * FEWEST, 2 * size), len(path)))
-    while first > 0 and continues(path, first - 1, free):
+    last = min(first + max(2 * FEWEST, 2 * size), len(path))
+    while first > 0 and continues(path, first - 1, slice(first, last)):
         first -= 1
-    return int(path.frames[first]) if first else None
+    # Within a step of its end a hand's push does not show.
+    return int(path.frames[first + 1]) if first else None
 
 
 def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:

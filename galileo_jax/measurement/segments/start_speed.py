@@ -34,8 +34,17 @@ class StartSpeed(NamedTuple):
     sd_m_s: float
 
 
-def start_speed(observation: Observation) -> StartSpeed | None:
-    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
+class _Way(NamedTuple):
+    """The first half of a way: times from the first place seen, s, `[place]`, metres, and sds."""
+
+    times_s: np.ndarray
+    way_m: np.ndarray
+    sd_m: np.ndarray
+    sign: float  # -1: it first goes against the way of all
+
+
+def _first_half(observation: Observation) -> _Way | None:
+    """Of object 1; None where too little of it is seen."""
     seen = np.flatnonzero(observation.mask[0])
     place_m = observation.position_m[0][:, seen]
     gone = place_m - place_m[:, :1]
@@ -51,18 +60,42 @@ def start_speed(observation: Observation) -> StartSpeed | None:
     sign = -1.0 if way[back] < -CLEAR * math.hypot(sd[0], sd[back]) else 1.0
     way, end = sign * way, back if sign < 0 else farthest
     early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way[end]))))
-    times, sd = (observation.times_s[seen] - observation.times_s[seen[0]])[early], sd[early]
-    moving, moves_cost, spread = _least_squares(
-        np.vander(times, TERMS, increasing=True), way[early], sd
-    )
+    times = observation.times_s[seen] - observation.times_s[seen[0]]
+    return _Way(times[early], way[early], sd[early], sign)
+
+
+def start_speed(observation: Observation) -> StartSpeed | None:
+    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
+    early = _first_half(observation)
+    if early is None:
+        return None
+    times, way, sd, sign = early
+    moving, moves_cost, spread = _least_squares(np.vander(times, TERMS, increasing=True), way, sd)
     size = max(1.0, moves_cost / max(len(times) - TERMS, 1))
     found = StartSpeed(float(moving[1]), math.sqrt(size * spread[1, 1]))
     in_a_step = max(2 * float(moving[2]), 0.0) * float(np.median(np.diff(times)))
     if found.mean_m_s - CLEAR * found.sd_m_s < in_a_step:
         return None
-    better = _let_go_cost(times, way[early], sd) - moves_cost
+    better = _let_go(times, way, sd)[0] - moves_cost
     found = found._replace(mean_m_s=sign * found.mean_m_s)
     return found if better > CLEAR**2 * size else None
+
+
+def rest_s(observation: Observation) -> float | None:
+    """How long object 1 rests where it is first seen, s; None where it is let go at once, or moves.
+
+    It rests if a release that late is likelier than one in the first frame by `CLEAR` standard
+    deviations.
+    """
+    early = _first_half(observation)
+    if early is None:
+        return None
+    times, way, sd, _ = early
+    cost, release_s = _let_go(times, way, sd)
+    better = _least_squares(_since(times, 0.0), way, sd)[1] - cost
+    size = max(1.0, cost / max(len(times) - TERMS, 1))
+    is_later = release_s > 1.5 * float(np.median(np.diff(times)))
+    return release_s if is_later and better > CLEAR**2 * size else None
 
 
 def on_ramp(observation: Observation) -> Observation:
@@ -73,20 +106,24 @@ def on_ramp(observation: Observation) -> Observation:
     return replace(observation, mask=mask)
 
 
-def _let_go_cost(times_s: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray) -> float:
-    """The least sum of squared errors of a release from rest in the clip."""
+def _since(times_s: np.ndarray, release_s: float) -> np.ndarray:
+    """Powers of the time since a release, without the first, `[place, term]`."""
+    after = np.maximum(times_s - release_s, 0.0)
+    return np.delete(np.vander(after, TERMS, increasing=True), 1, axis=1)
+
+
+def _let_go(times_s: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray) -> tuple[float, float]:
+    """The least sum of squared errors of a release from rest in the clip, and its instant, s."""
 
     def cost(release_s: float) -> float:
-        after = np.maximum(times_s - release_s, 0.0)
-        design = np.delete(np.vander(after, TERMS, increasing=True), 1, axis=1)
-        return _least_squares(design, way_m, sd_m)[1]
+        return _least_squares(_since(times_s, release_s), way_m, sd_m)[1]
 
     grid = np.linspace(times_s[0], times_s[-1], RELEASES)
     costs = [cost(release_s) for release_s in grid]
     at = int(np.argmin(costs))
     bounds = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, RELEASES - 1)])
     between = cast(OptimizeResult, minimize_scalar(cost, bounds=bounds, method="bounded"))
-    return min(costs[at], float(between.fun))
+    return min((costs[at], float(grid[at])), (float(between.fun), float(between.x)))
 
 
 def _least_squares(

@@ -42,3 +42,12 @@ def test_release(first_frame: str, sd_s: float, tmp_path: Path) -> None:
     found = build_scene(measured.clip, measured.observation).surroundings.release_s
     assert found[0] == pytest.approx(HELD_S, abs=sd_s / 3)
     assert found[1] == pytest.approx(sd_s, rel=1e-4)
+
+
+@pytest.mark.parametrize("first_frame, is_said", [("0", True), ("12", False), ("null", False)])
+def test_a_rest_before_the_release_is_said(first_frame: str, is_said: bool, tmp_path: Path) -> None:
+    """The release is taken to be in the first frame unless somebody says otherwise."""
+    remarks = measure(load_clip(write_track(tmp_path, first_frame))).remarks
+    said = [line for line in remarks if "first_frame: null" in line]
+    assert bool(said) == is_said
+    assert not is_said or "object1 rests for 0.4 s from frame 0 on" in said[0]

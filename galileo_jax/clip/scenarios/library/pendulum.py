@@ -10,6 +10,7 @@ register(
         name="pendulum",
         meaning="one object swings on a thread or a rod",
         has_ramp=False,
+        line="aside",
         up_shows="sag",
         moves_in_plane=True,
         laws=("pendulum", "start_velocity"),
