@@ -179,7 +179,9 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     if degrees > 90 - LEVEL_DEG:
         return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
     why = f"a straight way at {degrees:.2f} degrees"
-    is_slope = LEVEL_DEG < degrees < STEEP_DEG
+    if degrees <= LEVEL_DEG:
+        return Likely("level", why, slope_deg=degrees)
+    is_slope = degrees < STEEP_DEG
     return Likely("incline", why, is_clear=is_slope, slope_deg=degrees)
 
 
