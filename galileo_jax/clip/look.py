@@ -144,6 +144,8 @@ def _likely(
     if len(place) == 1:
         return _along_a_line(seconds, place[0], metres_per_unit)
     found = likely_in_plane(place[0], place[1])
+    if found.scenario == "level":  # a table's x may lie along a slope, as a picture's does not
+        return replace(found, scenario="incline")
     if found.scenario != "fall":
         return found
     size = abs(_acceleration(seconds, place[1]) * metres_per_unit)

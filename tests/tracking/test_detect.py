@@ -40,7 +40,7 @@ def test_nothing_that_moves_gives_nothing():
 
 def test_a_thing_whose_middle_is_plain_is_one_thing():
     left, _, _ = paths()
-    right = left + [52.0, 0, 0]
+    right = left + np.array([52.0, 0, 0])
     frames = film([(Box((12, 26), seed=0), left), (Box((12, 26), seed=4), right)])
     (mover,) = find_movers(lambda: iter(frames), 44)
     np.testing.assert_allclose(mover.point_px, [66, 80], atol=3)
@@ -48,7 +48,7 @@ def test_a_thing_whose_middle_is_plain_is_one_thing():
 
 def test_two_things_that_set_out_together_and_part_are_two():
     first, _, _ = paths()
-    second = first + [40.0, 0, 0]
+    second = first + np.array([40.0, 0, 0])
     second[:, 0] += 1.5 * np.clip(np.arange(40.0) - 8, 0, None)
     frames = film([(Box((12, 26), seed=0), first), (Box((12, 26), seed=4), second)])
     assert len(find_movers(lambda: iter(frames), 44)) == 2
