@@ -6,6 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from galileo_jax.api.bundle import Bundle, bundle_of
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
@@ -150,7 +152,7 @@ def explain(
     pixels_per_metre: float | None = None,
     track_units: str | None = None,
     fps: float | None = None,
-    point: Sequence[float] | None = None,
+    point: Sequence[float] | Sequence[Sequence[float]] | None = None,
     engine: str = "auto",
     seed: int = 0,
     on_progress: OnProgress | None = None,
@@ -170,7 +172,8 @@ def explain(
       pixels_per_metre: of the picture; None: not known.
       track_units: of a table: m, cm, mm, km, in, ft or px; None: as the table says.
       fps: true frames per second; None: as the file says.
-      point: (x, y), the middle of the object in the first picture, px; None: what moves first.
+      point: (x, y), the middle of the object in the first picture, px, or one for each object in
+        the order in which they set out; None: what moves first.
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
       seed: of all random numbers; the same seed gives the same result.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
@@ -194,7 +197,9 @@ def explain(
         pixels_per_metre=pixels_per_metre,
         track_units=track_units,
         fps=fps,
-        points=None if point is None else [tuple(point)],
+        points=None
+        if point is None
+        else [(float(x), float(y)) for x, y in np.reshape(point, (-1, 2))],
     )
     with progress.scope(on_progress, cancel):
         progress.report("looking", 0.0)

@@ -149,7 +149,9 @@ def _points(known: Understood) -> Question | None:
     default = "both" if known.is_pair else str(likeliest)
     why = f"{len(known.things)} things move, in the order in which they set out: {listed}"
     text = "Which thing is to be followed? A number, both (one runs into the other), or x y"
-    return Question("points", text, why, f"--point {x:.0f} {y:.0f}", default)
+    meant = list(known.things)[:2] if known.is_pair else [(x, y)]
+    example = " ".join(f"--point {x:.0f} {y:.0f}" for x, y in meant)
+    return Question("points", text, why, example, default)
 
 
 def _scenario(known: Understood, answers: Answers) -> Question | None:
@@ -248,6 +250,11 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     if size is not None:
         text += f"; or how long object 1 is (about {size:.0f} px), such as 0.06 m"
     why = "friction cannot be told from lengths in pixels"
+    if known.is_film:
+        why += (
+            "; the pixels of a length that you know, divided by its metres; galileo look "
+            f"{shlex.quote(str(known.source))} --plot first.png draws a ruler"
+        )
     return Question("pixels_per_metre", text, why, "--pixels-per-metre 900")
 
 

@@ -144,6 +144,8 @@ def _likely(
     if len(place) == 1:
         return _along_a_line(seconds, place[0], metres_per_unit)
     found = likely_in_plane(place[0], place[1])
+    if found.scenario == "level":  # a table's x may lie along a slope, as a picture's does not
+        return replace(found, scenario="incline")
     if found.scenario != "fall":
         return found
     size = abs(_acceleration(seconds, place[1]) * metres_per_unit)
@@ -179,7 +181,9 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     if degrees > 90 - LEVEL_DEG:
         return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
     why = f"a straight way at {degrees:.2f} degrees"
-    is_slope = LEVEL_DEG < degrees < STEEP_DEG
+    if degrees <= LEVEL_DEG:
+        return Likely("level", why, slope_deg=degrees)
+    is_slope = degrees < STEEP_DEG
     return Likely("incline", why, is_clear=is_slope, slope_deg=degrees)
 
 

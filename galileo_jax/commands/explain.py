@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int | None:
     engine, seed = call.pop("engine"), call.pop("seed")
     said = {OF_YAML.get(key, key): value for key, value in call.items() if value is not None}
     if (point := said.pop("point", None)) is not None:
-        said["points"] = [tuple(point)]
+        said["points"] = [tuple(one) for one in point]
     is_folder = len(files) == 1 and Path(files[0]).is_dir()
     to = to or (f"runs/{Path(files[0]).resolve().name}" if is_folder else None)
     try:
@@ -251,7 +251,7 @@ def _parser() -> command.Parser:
     add("pixels_per_metre", metavar="SCALE")
     add("track_units", metavar="UNIT")
     add("fps", metavar="HZ")
-    add("point", nargs=2, type=float, action="store", default=None, metavar=("X", "Y"))
+    add("point", nargs=2, type=float, action="append", default=None, metavar=("X", "Y"))
     add("engine", choices=ENGINES, metavar=None)
     add("seed", type=command.whole_number(0))
     parser.examples(

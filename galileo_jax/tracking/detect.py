@@ -25,6 +25,8 @@ MOVED_PX = 3.0
 SAME_ONSET_FRAMES = 3
 SAME_WAY_PX = 3.0
 """Features of one thing are displaced alike to this, while they turn little."""
+NEARER = 0.05
+"""Of a size in the picture: it may change by this, as the thing comes nearer."""
 MIN_FEATURES = 5
 LOOK_AHEAD_FRAMES = 3
 MOST = 0.8
@@ -213,9 +215,45 @@ def _groups(path: np.ndarray, onset: np.ndarray, span_px: float) -> list[np.ndar
             joined = set(others[near & together & alike].tolist())
             left -= joined
             edge |= joined
-        if len(group) >= MIN_FEATURES:
-            groups.append(candidates[sorted(group)])
-    return groups
+        groups.append(candidates[sorted(group)])
+    joined = _joined(path, onset, groups, span_px)
+    return [group for group in joined if len(group) >= MIN_FEATURES]
+
+
+def _joined(
+    path: np.ndarray, onset: np.ndarray, groups: list[np.ndarray], span_px: float
+) -> list[np.ndarray]:
+    """Groups joined where they are parts of one thing: its plain middle has no features.
+
+    Parts set out together from places less than 2 `span_px` apart, and keep their distance.
+    """
+    whole: list[np.ndarray] = []
+    for group in sorted(groups, key=len, reverse=True):
+        one, parts = group, whole
+        while mine := [part for part in parts if _is_one_thing(path, onset, part, one, span_px)]:
+            parts = [part for part in parts if all(part is not other for other in mine)]
+            one = np.sort(np.concatenate([one, *mine]))
+        whole = [*parts, one]
+    return whole
+
+
+def _is_one_thing(
+    path: np.ndarray, onset: np.ndarray, first: np.ndarray, second: np.ndarray, span_px: float
+) -> bool:
+    """Whether the features of two groups go alike for as long as they are seen together."""
+    if abs(np.median(onset[first]) - np.median(onset[second])) > SAME_ONSET_FRAMES:
+        return False
+    one, other = path[:, first][:, :, None], path[:, second][:, None]
+    apart = np.linalg.norm(one - other, axis=3)  # [frame, of the first, of the second]
+    if apart[0].min() > 2 * span_px:
+        return False
+    # Most of them: a feature at the border of a thing may hold on to what is behind.
+    change = np.nanmax(abs(apart - apart[0]), axis=0)
+    gone = np.linalg.norm(path[:, first] - path[0, first], axis=2)[:, :, None]
+    way = np.nanmax(np.where(np.isfinite(apart), gone, 0.0), axis=0)
+    is_far = way > SAME_WAY_PX + apart[0] / 2
+    is_alike = change < SAME_WAY_PX + NEARER * apart[0]
+    return bool(np.mean(is_far & is_alike) > 0.5)
 
 
 def _last_seen(path: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import yaml
 
 from galileo_jax.__main__ import main
 from galileo_jax.api.look import look
+from galileo_jax.clip.look import likely_in_plane
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.runtime.errors import InputError
 
@@ -65,3 +66,9 @@ def test_a_yaml_that_is_there_is_named_and_no_other_is_proposed(tmp_path: Path, 
     out = capsys.readouterr().out
     assert "a.yaml, which is there already" in out
     assert "would be" not in out and "objects:" not in out
+
+
+def test_a_level_way_in_a_picture_is_no_slope():
+    x = np.linspace(60.0, 900.0, 40)
+    found = likely_in_plane(x, 400 + 0.002 * x)
+    assert (found.scenario, found.is_clear) == ("level", False)

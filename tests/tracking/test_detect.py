@@ -51,6 +51,22 @@ def test_a_small_ball_in_fast_flight_is_found_by_its_silhouette(first: int):
     np.testing.assert_allclose(mover.point_px, flight[first, :2], atol=1.5)
 
 
+def test_a_thing_whose_middle_is_plain_is_one_thing():
+    left, _, _ = paths()
+    right = left + np.array([52.0, 0, 0])
+    frames = film([(Box((12, 26), seed=0), left), (Box((12, 26), seed=4), right)])
+    (mover,) = find_movers(lambda: iter(frames), 44)
+    np.testing.assert_allclose(mover.point_px, [66, 80], atol=3)
+
+
+def test_two_things_that_set_out_together_and_part_are_two():
+    first, _, _ = paths()
+    second = first + np.array([40.0, 0, 0])
+    second[:, 0] += 1.5 * np.clip(np.arange(40.0) - 8, 0, None)
+    frames = film([(Box((12, 26), seed=0), first), (Box((12, 26), seed=4), second)])
+    assert len(find_movers(lambda: iter(frames), 44)) == 2
+
+
 def test_outline_is_moved_to_the_sharp_sides():
     pose = np.array([80.4, 60.2, 0.3])
     image = grey(film([(FIRST, pose[None])])[0])
