@@ -17,8 +17,9 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
-SIZE_SD_PX = 5.0  # of a thing in the picture, whose ends are where its texture ends
-MOST_SD_SHARE = 0.2  # of a scale, as its key allows
+# Of a scale that is a thing's length in the picture, whose ends are where its texture seems to
+# end: as much as the scale's key allows.
+SIZE_SD_SHARE = 0.2
 NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
 
 
@@ -248,7 +249,7 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     text = "How many pixels are a metre? Pixels, such as 900 px"
     size = _length_px(known, answers)
     if size is not None:
-        text += f"; or how long object 1 is (about {size:.0f} px), such as 0.06 m"
+        text += f"; or, good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
     why = "friction cannot be told from lengths in pixels"
     if known.is_film:
         why += (
@@ -287,10 +288,9 @@ def _scale_of(text: str, length: float | None) -> dict[str, Any]:
     if length is None or size <= 0:
         raise InputError(f"pixels_per_metre: {text!r}; such as 900 px expected")
     scale = length / (size * METRES_PER_UNIT[found["unit"]])
-    share = min(SIZE_SD_PX / length, MOST_SD_SHARE)
     return {
         "pixels_per_metre": round(scale, 1),
-        "pixels_per_metre_sd": float(f"{share * scale:.2g}"),
+        "pixels_per_metre_sd": float(f"{SIZE_SD_SHARE * scale:.2g}"),
     }
 
 

@@ -1,6 +1,8 @@
 """Sweeps of real fits: ready configs, kills, Ray with a node that is lost."""
 
 import csv
+import threading
+import time
 
 import pytest
 
@@ -114,18 +116,30 @@ def test_ray_loses_a_node_and_nothing_else(cluster, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
-def test_ray_equals_local_to_the_last_digit(cluster, tracks, tmp_path):
-    cluster.add_node(num_cpus=1)
+@pytest.mark.parametrize("what", ["plan", "folder"])
+def test_ray_equals_local_to_the_last_digit(what, cluster, tracks, tmp_path):
+    """A folder of clips also where a node is lost after the first of them."""
+    second = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
-    words = [str(tmp_path / "plan.yaml")]
-    (tmp_path / "plan.yaml").write_text(
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(
         f"clips: ['{tracks}/*.csv']\nlist: [{{method: cnn}}, {{method: grad}}, {{method: explain}}]"
     )
+    words = [str(plan if what == "plan" else tracks)]
     where = {"local": ["--workers", "1"], "ray": ["--engine", "ray", "--address", cluster.address]}
+
+    def lose_second() -> None:
+        while not any((tmp_path / "ray").rglob("result.json")):
+            time.sleep(0.1)
+        cluster.remove_node(second, allow_graceful=False)
+
+    if what == "folder":
+        threading.Thread(target=lose_second, daemon=True).start()
     for name, more in where.items():
         assert command.run(sweep.main, [*words, *more, "--out", str(tmp_path / name)]) == 0
     for file in ("summary.csv", "summary.parquet"):
         assert (tmp_path / "local" / file).read_bytes() == (tmp_path / "ray" / file).read_bytes()
+    assert what == "plan" or len(cluster.list_all_nodes()) == 1
 
 
 @pytest.mark.slow
