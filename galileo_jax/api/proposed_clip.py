@@ -131,6 +131,8 @@ def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
         {"name": f"object{n}", "shape": shape, "point_px": [float(x), float(y)]}
         for n, (x, y) in enumerate(points, 1)
     ]
+    if scenario.has_table:  # nobody has said when object 1 is let go: its motion does
+        content["objects"][0]["first_frame"] = None
     return {key: content[key] for key in KEY_ORDER if key in content}
 
 

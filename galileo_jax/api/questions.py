@@ -18,8 +18,8 @@ from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
 # Of a scale that is a thing's length in the picture, whose ends are where its texture seems to
-# end: as much as the scale's key allows.
-SIZE_SD_SHARE = 0.2
+# end: as much as the scale's key allows, a fifth, once it is rounded.
+SIZE_SD_SHARE = 0.19
 NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
 
 
@@ -249,7 +249,9 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     text = "How many pixels are a metre? Pixels, such as 900 px"
     size = _length_px(known, answers)
     if size is not None:
-        text += f"; or, good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
+        text += (
+            f"; or, good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
+        )
     why = "friction cannot be told from lengths in pixels"
     if known.is_film:
         why += (

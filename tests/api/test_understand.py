@@ -212,6 +212,10 @@ def test_of_two_things_a_person_chooses(tmp_path):
     assert np.hypot(x - 150, y - 90) < 5
     assert parsed(one, "both", known, {})["points"] == list(known.things)
     assert parsed(one, "31 41.5", known, {}) == {"points": [(31.0, 41.5)]}
+    said = {"points": list(known.things), "scenario": "ramp", "pixels_per_metre": 900.0}
+    listed = yaml.safe_load(yaml_of(known, said))["objects"]
+    assert listed[0]["first_frame"] is None, "its motion says when it is let go"
+    assert "first_frame" not in listed[1]
     with pytest.raises(InputError, match="x and y expected"):
         parsed(one, "the red one", known, {})
 
