@@ -206,3 +206,11 @@ class Diagnosis:
     def probability_none(self) -> float:
         """That no effect is missing; with those of the candidates it sums to 1."""
         return float(softmax([0.0, *(c.log_odds for c in self.candidates)])[0])
+
+    def share_explained(self, candidate: Candidate | None) -> float:
+        """What of the base's chi2 beyond that of noise a candidate takes away; None: nothing."""
+        misfit = self.base.error["chi2_per_dof"] - 1.0
+        if candidate is None or misfit <= 0.0:
+            return 0.0
+        left = max(candidate.error["chi2_per_dof"] - 1.0, 0.0)
+        return max(0.0, 1.0 - left / misfit)

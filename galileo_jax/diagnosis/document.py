@@ -205,7 +205,7 @@ def _missing_force(
                 "path_m": missing.path_m[i].tolist(),
                 "speed_m_s": missing.speed_m_s[i].tolist(),
                 "formula": text,
-                "share_explained": _share_explained(diagnosis, best),
+                "share_explained": diagnosis.share_explained(best),
             }
             for i, name in enumerate(names)
         },
@@ -232,12 +232,3 @@ def _formula(best: Candidate, is_explained: bool) -> dict[str, Any]:
         "p_value": best.p_value,
         "chi2_per_dof": best.error["chi2_per_dof"],
     }
-
-
-def _share_explained(diagnosis: Diagnosis, best: Candidate | None) -> float:
-    """What of chi2 beyond that of noise a formula takes away."""
-    misfit = diagnosis.base.error["chi2_per_dof"] - 1.0
-    if best is None or misfit <= 0.0:
-        return 0.0
-    left = max(best.error["chi2_per_dof"] - 1.0, 0.0)
-    return max(0.0, 1.0 - left / misfit)

@@ -9,7 +9,7 @@ from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
-from galileo_jax.diagnosis.verdict import UNEVEN
+from galileo_jax.diagnosis.verdict import DECISIVE, UNEVEN
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
 from galileo_jax.results.command_line import command_line
@@ -20,6 +20,7 @@ from galileo_jax.statespace.term import TERMS
 NO_EFFECTS = "no effects"
 ROUGHNESS = "friction_roughness"
 MOST_APART = 2  # that are said one by one
+NEARLY_ALL = 0.9  # of the squared error beyond noise: what does so is worth a sentence
 PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that explains the data
 
 
@@ -95,7 +96,18 @@ def verdict(diagnosis: Diagnosis) -> str:
             f"({p_equals(first.p_value)} without, {p} with)."
         )
     where = "; see the missing force" if diagnosis.missing is not None else ""
-    return f"No known effect explains the data{where}."
+    return f"{_leading(diagnosis)}No known effect explains the data{where}."
+
+
+def _leading(diagnosis: Diagnosis) -> str:
+    """Which hypothesis takes nearly all of the error away, though not all; "" where none does."""
+    best = diagnosis.candidates[0] if diagnosis.candidates else None
+    share = diagnosis.share_explained(best)
+    if best is None or best.law is not None or best.log_odds < DECISIVE or share < NEARLY_ALL:
+        return ""
+    verb = "takes" if len(best.effects) == 1 else "together take"
+    names = " and ".join(best.effects)
+    return f"{names} {verb} {100 * min(share, 0.99):.0f} % of the error away, though not all. "
 
 
 def roughness(hypothesis: Hypothesis) -> float:

@@ -1,8 +1,9 @@
 """Numbers as text with the digits that they bear, and no more.
 
 A digit is shown if it is worth more than the Monte Carlo error, and not beyond the second figure of
-the standard deviation. Mean, standard deviation and interval end at the same place: that of the
-least certain, an end of the interval.
+the standard deviation; its first figure is always shown, for an interval has two ends. Mean,
+standard deviation and interval end at the same place: that of the least certain, an end of the
+interval.
 """
 
 import math
@@ -22,11 +23,10 @@ def number(value: float | None, sd: float | None, error: float = 0.0) -> str:
         return "n/a"
     if not sd or not math.isfinite(sd):
         return f"{value:.4g}"
-    places = 1 - math.floor(math.log10(sd))
+    first = -math.floor(math.log10(sd))
+    places = first + 1
     if error > 0:
-        places = min(places, -math.ceil(math.log10(error)))
-    if value == sd:  # itself an uncertainty, which is never 0
-        places = max(places, -math.floor(math.log10(sd)))
+        places = max(first, min(places, -math.ceil(math.log10(error))))
     return f"{round(value, min(places, 9)):z.{min(max(places, 0), 9)}f}"  # z: never -0.00
 
 

@@ -21,7 +21,7 @@ from galileo_jax.report.diagnosis_page import (
 )
 from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.provenance import digest
-from tests.found import LAW, comparison_of, diagnosis_of, fit_of, make_trials
+from tests.found import ERROR, LAW, comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit
 from tests.report.browser import opened
 from tests.report.references import check_needs_nothing_from_outside
@@ -73,6 +73,16 @@ def write(trials, clip, status: str, page: Path) -> str:
     told = {"truth": "air_drag", "command": AGAIN, "next_command": GO_ON, "seed": 0}
     write_diagnosis_page(page, HOSTILE, trials, diagnosis, record, [clip], **told)
     return page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("left", "says"), [(1.2, True), (2.0, False)])
+def test_what_takes_nearly_all_of_the_error_away_is_said_first(left, says, trials):
+    found = diagnosis_of(trials, "unknown")
+    best = replace(found.candidates[0], error=ERROR | {"chi2_per_dof": left})
+    sentence = diagnosis_text.verdict(replace(found, candidates=(best, *found.candidates[1:])))
+    said = "air_drag takes 93 % of the error away, though not all. "
+    assert sentence.startswith(said if says else "No known effect explains the data")
+    assert "No known effect explains the data" in sentence
 
 
 @pytest.mark.parametrize("status", STATUSES)
