@@ -57,11 +57,15 @@ def test_a_refit_takes_up_what_the_parameters_are_free_to(fitted, noise):
 
 
 def test_they_are_refitted_to_the_end(fitted):
-    """One step more changes hardly anything, one less does no better."""
+    """One step more changes hardly anything, one less does no better.
+
+    Of the data's squares alone: with the prior's, which are minimised, too, a step may raise them a
+    little.
+    """
     usual = bootstrap.NUM_STEPS
     less, own, more = (squares(*fitted, num_steps=usual + change) for change in (-1, 0, 1))
     assert np.mean(np.abs(more - own)) < 0.05
-    assert np.mean(own) <= np.mean(less) + 0.05
+    assert np.mean(own) <= np.mean(less) + 0.1
 
 
 def test_a_jacobian_that_does_not_hold_makes_no_wild_replicates(fitted, noise):
