@@ -11,7 +11,7 @@
 Rollouts of all replicates are one batch.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -71,24 +71,37 @@ def replicates(
     each = zip(trials.problems, noise_scale, mode_size, labels, strict=True)
     noise = np.concatenate([_errors(*one, count, generator) for one in each], axis=1)
     centre = generator.standard_normal((count, len(free)))
-    gain = inverse(jacobian.T @ jacobian + np.eye(len(free)))
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
 
-    moved = np.zeros((count, len(free)))
+    def residual_at(moved: np.ndarray) -> np.ndarray:
+        z = np.tile(fit.z, (count, 1))
+        z[:, free] += moved
+        return noise + np.concatenate(_at(trials, fit, z, noise_scale), axis=1) - base
+
+    best, _ = _refitted(noise, centre, jacobian, residual_at)
+    return np.split(best, ends, axis=1)
+
+
+def _refitted(
+    noise: np.ndarray,
+    centre: np.ndarray,
+    jacobian: np.ndarray,
+    residual_at: Callable[[np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """What refits of all replicates leave, `[replicate, value]`, and their costs, `[replicate]`."""
+    gain = inverse(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
+    moved = np.zeros_like(centre)
     # Where the Jacobian does not hold no step may help: then the truth itself is the fit.
     residual = best = noise
     cost = np.sum(noise**2, axis=1) + np.sum(centre**2, axis=1)
     for _ in range(NUM_STEPS):
         moved = moved - (residual @ jacobian + (moved - centre)) @ gain
-        z = np.tile(fit.z, (count, 1))
-        z[:, free] += moved
-        true = np.concatenate(_at(trials, fit, z, noise_scale), axis=1)
-        residual = noise + true - base
+        residual = residual_at(moved)
         with np.errstate(over="ignore", invalid="ignore"):  # gone beyond all numbers: no better
             now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
         improves = now < cost
         best, cost = np.where(improves[:, None], residual, best), np.where(improves, now, cost)
-    return np.split(best, ends, axis=1)
+    return best, cost
 
 
 def _errors(

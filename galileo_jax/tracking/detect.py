@@ -15,7 +15,7 @@ import numpy as np
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.lucas_kanade import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.silhouette import Path, paths_of
+from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
@@ -116,13 +116,9 @@ def find_movers(
 
 def _silhouettes(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> list[Mover]:
     """The thing whose silhouette goes farthest, by more than its size; empty: there is none."""
-
-    def way_px(path: Path) -> float:
-        return float(np.hypot(*np.ptp(path.places_px, axis=0)))
-
     paths = [one for one in paths_of(open_frames, np.arange(count)) if len(one.parts) >= LEAST_SEEN]
-    found = max(paths, key=way_px, default=None)
-    if found is None or way_px(found) < found.parts[0].size_px:
+    found = max(paths, key=lambda one: one.way_px, default=None)
+    if found is None or found.way_px < found.parts[0].size_px:
         return []
     place, first = found.places_px, found.parts[0]
     return [

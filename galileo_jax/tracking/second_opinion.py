@@ -10,7 +10,7 @@ from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.noise import motion_variance, sudden
 from galileo_jax.tracking.poses_to_track import Finished
 from galileo_jax.tracking.refiner import velocities_at
-from galileo_jax.tracking.silhouette import MOST_MISSED, Path
+from galileo_jax.tracking.silhouette import MOST_MISSED, Path, way_px
 
 LOST_SHARE = 0.05
 """Of the frames in which an object is looked for: if it is missed in more, its silhouette is."""
@@ -52,7 +52,7 @@ def needs_silhouette(found: Finished, start: Start) -> bool:
 
 def _stays(found: Finished, seen: Bool[np.ndarray, " frame"]) -> bool:
     """Whether what is followed hardly moves."""
-    return bool(seen.any()) and _way_px(found.position_px[seen]) < STAYS_PX
+    return bool(seen.any()) and way_px(found.position_px[seen]) < STAYS_PX
 
 
 def with_silhouette(
@@ -75,14 +75,14 @@ def with_silhouette(
     """
     seen = np.isfinite(found.angle_rad)
     if _stays(found, seen):
-        first, way = np.arange(len(seen)) == int(seen.argmax()), _way_px(found.position_px[seen])
-        far = [path for path in paths if _way_px(path.places_px) > FARTHER * way]
+        first, way = np.arange(len(seen)) == int(seen.argmax()), way_px(found.position_px[seen])
+        far = [path for path in paths if path.way_px > FARTHER * way]
         if any(_is_own(path, found.position_px, first, start) for path in far):
             seen = first
     own = [path for path in paths if _is_own(path, found.position_px, seen, start)]
     if not own:
         return found
-    path = max(own, key=lambda one: _way_px(one.places_px))
+    path = max(own, key=lambda one: one.way_px)
     place = np.full_like(found.position_px, np.nan)
     place[path.frames] = path.places_px
     place[[not start.uses(index) for index in range(len(place))]] = np.nan
@@ -98,7 +98,7 @@ def with_silhouette(
     is_more = more >= max(LEAST_FRAMES, LEAST_SHARE * seen.sum())
     if not is_more and not (_turns(found, start) and _is_smoother(found, place, both, clock)):
         return found
-    if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
+    if not is_fixed and way_px(place[shown]) < way_px(found.position_px[seen]):
         return found
     kept, slow_px = _in_long_runs(seen & ~shown), _slow_px(path)
     if not is_fixed:
@@ -184,7 +184,7 @@ def _is_own(
     """Whether a path of silhouettes is the object's: it moves, and meets the texture's path."""
     place, frames = path.places_px, np.array(path.frames)
     size = float(np.median([part.size_px for part in path.parts]))
-    if _way_px(place) < size or len(frames) < SAME_FRAMES or not seen.any():
+    if way_px(place) < size or len(frames) < SAME_FRAMES or not seen.any():
         return False
     if start.outline.size_px is not None:
         low, high = np.array(OUTLINE_AREA) * np.prod(start.outline.size_px)
@@ -200,10 +200,6 @@ def _is_own(
     off = np.hypot(*(place[0] - position_px[nearest]))
     is_next = abs(frames[0] - nearest) <= MOST_MISSED
     return bool(is_next and off < BESIDE * path.parts[0].size_px)
-
-
-def _way_px(place: Float[np.ndarray, "frame 2"]) -> float:
-    return float(np.hypot(*np.ptp(place, axis=0)))
 
 
 def _turns(found: Finished, start: Start) -> bool:

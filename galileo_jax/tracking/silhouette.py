@@ -71,6 +71,11 @@ class Part:
         return bool((place >= self.low_px).all() and (place <= self.high_px).all())
 
 
+def way_px(places: Float[np.ndarray, "frame 2"]) -> float:
+    """The diagonal of the box that holds places, px."""
+    return float(np.hypot(*np.ptp(places, axis=0)))
+
+
 @dataclass
 class Path:
     """A part followed from frame to frame; `clock` in usual steps."""
@@ -83,6 +88,11 @@ class Path:
     def places_px(self) -> Float[np.ndarray, "frame 2"]:
         """Where it was."""
         return np.stack([part.centre_px for part in self.parts])
+
+    @property
+    def way_px(self) -> float:
+        """How far it went: the diagonal of the box that holds its places."""
+        return way_px(self.places_px)
 
     def expected(self, now: float) -> np.ndarray:
         """Where it should be at a time: by a parabola, at first by a line."""

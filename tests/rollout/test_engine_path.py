@@ -75,16 +75,20 @@ def test_the_draws_above_show_everything():
     assert any(found.foot_s is None for found in solved)
 
 
-@pytest.mark.parametrize("wanted", [0.0, 0.01, 0.3, 0.95])
-@pytest.mark.parametrize("mass", [(0.5, 0.3), (0.2, 0.9), (1.0, 1.0)])
-def test_restitution_and_momentum(wanted, mass):
+def speeds_at_the_hit(mass, **given):
+    """Of both bodies before and after it, and what friction takes between two records."""
     experiment = replace(SMOOTH, mass_kg=mass)
     hit = solve(experiment, np.zeros(1)).hit_s
     assert hit
-    _, velocity, times = simulate(experiment, hit + 0.02, impact_restitution=wanted)
-    before = velocity[:, 0, times < hit][:, -1]
-    after = velocity[:, 0, times > hit][:, 0]
+    _, velocity, times = simulate(experiment, hit + 0.02, **given)
     rubbed = 2 * 9.81 * LEAST_FRICTION * (times[1] - times[0])
+    return velocity[:, 0, times < hit][:, -1], velocity[:, 0, times > hit][:, 0], rubbed
+
+
+@pytest.mark.parametrize("wanted", [0.0, 0.01, 0.3, 0.95])
+@pytest.mark.parametrize("mass", [(0.5, 0.3), (0.2, 0.9), (1.0, 1.0)])
+def test_restitution_and_momentum(wanted, mass):
+    before, after, rubbed = speeds_at_the_hit(mass, impact_restitution=wanted)
     assert after[1] - after[0] == pytest.approx(wanted * before[0], abs=rubbed)
     assert np.dot(mass, after) == pytest.approx(np.dot(mass, before), abs=rubbed)
 
@@ -92,13 +96,7 @@ def test_restitution_and_momentum(wanted, mass):
 @pytest.mark.parametrize("factor", [0.98, 1.0, 1.02])
 @pytest.mark.parametrize("mass", [(0.4, 0.3), (0.1, 2.0)])
 def test_a_hit_passes_on_so_much_of_what_the_rear_body_loses(factor, mass):
-    experiment = replace(SMOOTH, mass_kg=mass)
-    hit = solve(experiment, np.zeros(1)).hit_s
-    assert hit
-    _, velocity, times = simulate(experiment, hit + 0.02, impact_momentum_object2=factor)
-    before = velocity[:, 0, times < hit][:, -1]
-    after = velocity[:, 0, times > hit][:, 0]
-    rubbed = 2 * 9.81 * LEAST_FRICTION * (times[1] - times[0])
+    before, after, rubbed = speeds_at_the_hit(mass, impact_momentum_object2=factor)
     lost, gained = mass[0] * (before[0] - after[0]), mass[1] * (after[1] - before[1])
     assert gained == pytest.approx(factor * lost, abs=rubbed)
 
