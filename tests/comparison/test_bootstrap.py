@@ -71,7 +71,9 @@ def test_a_refit_takes_up_what_the_parameters_are_free_to(fitted, noise):
 def test_they_are_refitted_to_the_end(fitted):
     """One step more changes hardly anything, one less does no better."""
     usual, costs = bootstrap.NUM_STEPS, []
-    _, own, more = (squares(*fitted, usual + change, costs) for change in (-1, 0, 1))
+    _, own, more = (
+        squares(*fitted, num_steps=usual + change, costs=costs) for change in (-1, 0, 1)
+    )
     assert np.mean(np.abs(more - own)) < 0.05
     less_cost, own_cost, more_cost = costs
     assert own_cost <= less_cost + 0.05 and more_cost == pytest.approx(own_cost, abs=0.05)
