@@ -241,10 +241,14 @@ class Effect:
     """
 
     name: ClassVar[str]
+    unknowns: ClassVar[tuple[Parameter, ...]] = ()
+    """Its `parameters`, where they are the same in every scene."""
 
     def __init_subclass__(cls, where: Place | None = None) -> None:
         """`where` tells in which scenes the effect has a place; in others its hooks do nothing."""
         super().__init_subclass__()
+        if "unknowns" in vars(cls):
+            cls.parameters = lambda self, scene: self.unknowns
         if where is None:
             return
         for hook in HOOKS:
@@ -398,7 +402,11 @@ class Effect:
         return position_m
 
 
-HOOKS = {name for name in vars(Effect) if not name.startswith("_")} - {"identity", "name"}
+HOOKS = {name for name in vars(Effect) if not name.startswith("_")} - {
+    "identity",
+    "name",
+    "unknowns",
+}
 
 
 def _in_place(where: Place, own: Any, absent: Any) -> Any:
@@ -409,6 +417,11 @@ def _in_place(where: Place, own: Any, absent: Any) -> Any:
         return (own if where(arguments[-1]) else absent)(self, *arguments)
 
     return hook
+
+
+def not_negative(k: PerObject) -> PerObject:
+    """Friction coefficients, or 0 in place of what is less."""
+    return k.__array_namespace__().maximum(k, 0.0 * k)
 
 
 def true_surroundings(effects: Sequence[Effect], theta: Theta, scene: Surroundings) -> Surroundings:

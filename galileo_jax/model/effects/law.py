@@ -22,6 +22,7 @@ from galileo_jax.model.effects.effect import (
     State,
     Surroundings,
     Theta,
+    not_negative,
 )
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter, Prior
 
@@ -45,7 +46,7 @@ def against_motion(size: Array, speed_m_s: Array) -> Array:
 
 def changed_friction(k: Array, value: Array) -> Array:
     """Coefficients k times 1 + value, but not negative."""
-    return k.__array_namespace__().maximum(k * (1.0 + value), 0.0 * k)
+    return not_negative(k * (1.0 + value))
 
 
 class Law(Effect):

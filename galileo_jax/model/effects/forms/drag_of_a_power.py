@@ -5,9 +5,8 @@ F = -drag_of_a_power (|v| / V)^power sign(v)    on every object; V = 1 m/s, in a
 
 from types import MappingProxyType
 
-from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
+from galileo_jax.model.effects import LogNormal, Parameter, Uniform
 from galileo_jax.model.effects.forms.form import Form
-from galileo_jax.model.parameters import LogNormal, Parameter, Uniform
 
 # The sizes that the drags of the library have.
 PRIOR, FALL_PRIOR = LogNormal(median=0.3, sd=1.2), LogNormal(median=0.3, sd=1.5)
@@ -18,8 +17,6 @@ SMALL = 0.01  # of the usual speed: there the slope of a root ends
 
 
 class DragOfAPower(Form):
-    """Drag of all objects by a law that has no name."""
-
     name = "drag_of_a_power"
     meaning = "a drag that grows with another power of the speed"
     family = "power_v"
@@ -29,8 +26,7 @@ class DragOfAPower(Form):
     constant_words = "the power of the speed"
     named_values = MappingProxyType({"viscous_drag": 1.0, "air_drag": 2.0})
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The drag at the usual speed, and the power."""
+    def parameters(self, scene):
         prior = PRIOR if scene.has_surface else FALL_PRIOR
         power = f"{self.name}_power"
         return (
@@ -38,13 +34,12 @@ class DragOfAPower(Form):
             Parameter(power, "1", POWER_PRIOR, USUAL_POWER, "effect", 0.1),
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the speeds."""
+    def force(self, theta, scene):
         size = theta[self.name][..., None]
         beside_linear = (theta[f"{self.name}_power"][..., None] - 1.0) / 2
         usual = USUAL_M_S if scene.has_surface else USUAL_FALL_M_S
 
-        def drag(state: State) -> Array:
+        def drag(state):
             share = state.speed_m_s / usual
             return -size * share * (share**2 + SMALL**2) ** beside_linear
 

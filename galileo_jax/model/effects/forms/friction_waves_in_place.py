@@ -7,9 +7,8 @@ A = friction_waves_in_place, B = friction_waves_in_place_later, q along the path
 
 import math
 
-from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.model.effects import LogNormal, Normal, Parameter, not_negative
 from galileo_jax.model.effects.forms.form import Form
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 
 AHEAD = math.pi / 2  # the cosine as a sine: XLA computes it three times as fast
 PRIOR = Normal(0.0, 0.1)
@@ -17,30 +16,23 @@ LENGTH_PRIOR = LogNormal(median=0.2, sd=0.7)
 
 
 class FrictionWavesInPlace(Form, where=lambda scene: scene.has_surface):
-    """Coefficients of all objects that wave along the path."""
-
     name = "friction_waves_in_place"
     meaning = "friction that goes up and down along the path"
     family = "wave_q"
+    unknowns = (
+        Parameter(name, "1", PRIOR, 0.0, "effect", 0.1),
+        Parameter(f"{name}_later", "1", PRIOR, 0.0, "effect", 0.1),
+        Parameter(f"{name}_length", "m", LENGTH_PRIOR, LENGTH_PRIOR.median, "effect", 0.1),
+    )
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Two strengths, a quarter of a wave apart, and its length; none in a fall."""
-        usual = LENGTH_PRIOR.median
-        return (
-            Parameter(self.name, "1", PRIOR, 0.0, "effect", 0.1),
-            Parameter(f"{self.name}_later", "1", PRIOR, 0.0, "effect", 0.1),
-            Parameter(f"{self.name}_length", "m", LENGTH_PRIOR, usual, "effect", 0.1),
-        )
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the places."""
+    def friction(self, theta, scene):
         first, later = theta[self.name][..., None], theta[f"{self.name}_later"][..., None]
         rate = (2 * math.pi / theta[f"{self.name}_length"])[..., None]
 
-        def law(state: State, k: Array) -> Array:
+        def law(state, k):
             xp = k.__array_namespace__()
             phase = rate * state.path_m
             wave = first * xp.sin(phase + AHEAD) + later * xp.sin(phase)
-            return xp.maximum(k + wave, xp.zeros_like(k))
+            return not_negative(k + wave)
 
         return law

@@ -8,24 +8,19 @@ the friction k. Whatever scales lengths or times (`pixels_per_metre`, `scale_err
 Source: Galilei, Discorsi (1638), third day.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects import Effect, LogNormal, Parameter
 from galileo_jax.model.effects.free_quantities import register
-from galileo_jax.model.parameters import LogNormal, Parameter
 
 PRIOR_SD = 0.2  # of the logarithm: 8.0 to 12.0 m/s^2 where 9.81 is declared
 
 
 @register
 class Gravity(Effect):
-    """Gravity is unknown, the same in all clips; what is declared is the prior's median."""
-
     name = "gravity"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The acceleration of free fall, m/s^2."""
+    def parameters(self, scene):
         prior = LogNormal(scene.gravity, PRIOR_SD)
         return (Parameter("gravity", "m/s^2", prior, scene.gravity, "main", 0.05),)
 
-    def gravity(self, theta: Theta, scene: Surroundings) -> Array:
-        """As inferred."""
+    def gravity(self, theta, scene):
         return theta["gravity"]

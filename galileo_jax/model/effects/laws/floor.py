@@ -9,19 +9,15 @@ Source: Newton, Principia, laws of motion, scholium (1687); Cross (2002), Grip-s
 a bouncing ball, Am. J. Phys. 70, 1093.
 """
 
-from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter, Uniform
+from galileo_jax.model.effects import Bounce, Effect, Normal, Parameter, Uniform
 
 MOST_GRIP = 0.6  # a ball that stops slipping keeps 5/7 of its speed or so
 
 
 class Floor(Effect, where=lambda scene: "floor" in scene.laws):
-    """A level floor."""
-
     name = "floor"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Restitution and grip, and how high a centre is at the impact (as measured)."""
+    def parameters(self, scene):
         height = Normal(*scene.expected["floor_height"])
         found = [
             Parameter("floor_restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
@@ -31,8 +27,7 @@ class Floor(Effect, where=lambda scene: "floor" in scene.laws):
             found.append(Parameter("floor_grip", "1", Uniform(0.0, MOST_GRIP), 0.0, "main", 0.05))
         return tuple(found)
 
-    def bounce(self, theta: Theta, scene: Surroundings) -> Bounce:
-        """The floor."""
+    def bounce(self, theta, scene):
         restitution = theta["floor_restitution"]
         grip = theta["floor_grip"] if scene.moves_in_plane else 0.0 * restitution
         return Bounce(theta["floor_height"], restitution, grip)

@@ -13,10 +13,7 @@ Source: Archimedes, On floating bodies; Poisson (1831), added mass; Batchelor, A
 Fluid Dynamics (1967), sections 5.11 and 6.8.
 """
 
-from collections.abc import Mapping
-
-from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter
 
 ADDED_MASS = 0.5  # of the displaced liquid's, for a sphere
 # A ball of 1 to 5 cm in water: c = 0.2 rho A.
@@ -24,33 +21,23 @@ DRAG_PRIOR = LogNormal(median=0.1, sd=1.5)
 
 
 class Liquid(Effect, where=lambda scene: "liquid" in scene.laws):
-    """What a liquid does to a body in it."""
-
     name = "liquid"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The ratio of the densities and the drag constant c."""
+    def parameters(self, scene):
         ratio = LogNormal(*scene.expected["density_ratio"])
         return (
             Parameter("density_ratio", "1", ratio, 0.0, "main", 0.05),
             Parameter("liquid_drag", "kg/m", DRAG_PRIOR, 0.0, "main", 0.1),
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """Buoyancy and drag."""
+    def force(self, theta, scene):
         lift = (theta["density_ratio"] * theta["m1"] * scene.gravity)[..., None]
         constant = theta["liquid_drag"][..., None]
+        return lambda state: -lift - constant * state.speed_m_s * abs(state.speed_m_s)
 
-        def push(state: State):
-            return -lift - constant * state.speed_m_s * abs(state.speed_m_s)
-
-        return push
-
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
-        """The liquid carried along."""
+    def inertia(self, theta, scene):
         return ADDED_MASS * theta["density_ratio"][..., None]
 
-    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """The speed at which drag and weight balance."""
+    def derived(self, theta, scene):
         pull = theta["m1"] * scene.gravity * abs(1.0 - theta["density_ratio"])
         return {"terminal_speed": ((pull / theta["liquid_drag"]) ** 0.5, "m/s")}

@@ -13,21 +13,16 @@ Source: Huygens, Horologium oscillatorium (1673); Baker and Blackburn, The Pendu
 """
 
 import math
-from collections.abc import Mapping
 
-from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.model.effects import PENDULUM, Effect, LogNormal, Normal, Parameter
 
 LENGTH, ANGLE = "thread_length", "start_angle"
 
 
 class Pendulum(Effect, where=lambda scene: PENDULUM in scene.laws):
-    """A bob on a thread or a rod."""
-
     name = PENDULUM
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The length, and each clip's angle at the start."""
+    def parameters(self, scene):
         length = LogNormal(*scene.expected[LENGTH])
         angle = Normal(*scene.expected[ANGLE])
         return (
@@ -35,8 +30,7 @@ class Pendulum(Effect, where=lambda scene: PENDULUM in scene.laws):
             Parameter(ANGLE, "rad", angle, angle.mean, "main", 0.02, per_clip=True),
         )
 
-    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """The period of small swings, and where the pivot is."""
+    def derived(self, theta, scene):
         length, angle = theta[LENGTH], theta[ANGLE]
         xp = length.__array_namespace__()
         x, y, *_ = scene.start_m[0]

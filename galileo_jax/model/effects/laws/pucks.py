@@ -20,10 +20,7 @@ and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int
 Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase flow (impact).
 """
 
-from collections.abc import Mapping
-
-from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter, Role, Uniform
+from galileo_jax.model.effects import Effect, Normal, Parameter, Rims, Role, Uniform
 
 OFFSET = (
     "hit_offset"  # in `Surroundings.expected`: how well places relative to each other are known
@@ -32,12 +29,9 @@ START = ("start_velocity_x", "start_velocity_y", "start_turning")
 
 
 class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
-    """Start velocities, the rims' restitution and grip, and where exactly they meet."""
-
     name = "pucks"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Of what moves when it is first seen its velocities; of several pucks what a hit does."""
+    def parameters(self, scene):
         units = ("m/s", "m/s", "rad/s")
         # Turning that is not in the track is known from the picture, and no result of the fit.
         roles: tuple[Role, ...] = ("main", "main", "main" if scene.num_axes == 3 else "nuisance")
@@ -60,8 +54,7 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
             ]
         return tuple(found)
 
-    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array:
-        """Of every puck, the turning too; 0 of those that rest."""
+    def start_velocity(self, theta, scene):
         zero = 0.0 * theta["m1"]
         rows = [
             [theta[name] if name in scene.expected else zero for name in _starts(i)]
@@ -70,8 +63,7 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
         xp = zero.__array_namespace__()
         return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
 
-    def rims(self, theta: Theta, scene: Surroundings) -> Rims:
-        """What a hit does, and where the pucks are beside where they were seen."""
+    def rims(self, theta, scene):
         zero = 0.0 * theta["m1"]
         xp = zero.__array_namespace__()
         places = [xp.stack([zero, zero], axis=-1)]
@@ -81,8 +73,7 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
             return Rims(zero, zero, xp.stack(places, axis=-2))
         return Rims(theta["restitution"], theta["grip"], xp.stack(places, axis=-2))
 
-    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """Where nobody knows how long a metre is: decelerations in radii of the puck."""
+    def derived(self, theta, scene):
         if scene.is_scale_known:
             return {}
         return {

@@ -12,42 +12,29 @@ Source: Hooke, De potentia restitutiva (1678); Taylor, Classical Mechanics (2005
 """
 
 import math
-from collections.abc import Mapping
 
-from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
-
-DAMPING_PRIOR = LogNormal(median=0.1, sd=1.5)
+from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter
 
 
 class Spring(Effect, where=lambda scene: "spring" in scene.laws):
-    """A hanging spring."""
-
     name = "spring"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Period without damping, damping, and where the object would hang at rest."""
+    def parameters(self, scene):
         period, rest = LogNormal(*scene.expected["period"]), Normal(*scene.expected["rest"])
         return (
             Parameter("period", "s", period, period.median, "main", 0.02),
-            Parameter("damping", "1/s", DAMPING_PRIOR, 0.0, "main", 0.1),
+            Parameter("damping", "1/s", LogNormal(0.1, 1.5), 0.0, "main", 0.1),
             Parameter("rest", "m", rest, 0.0, "main", 0.02, per_clip=True),
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The pull to the place of rest, gravity's part in it taken out, and the damping."""
+    def force(self, theta, scene):
         mass = theta["m1"][..., None]
         stiffness = mass * (2 * math.pi / theta["period"][..., None]) ** 2
         rubbing = 2 * mass * theta["damping"][..., None]
         rest, weight = theta["rest"][..., None], (theta["m1"] * scene.gravity)[..., None]
+        return lambda state: -stiffness * (state.path_m - rest) - rubbing * state.speed_m_s - weight
 
-        def pull(state: State):
-            return -stiffness * (state.path_m - rest) - rubbing * state.speed_m_s - weight
-
-        return pull
-
-    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """Stiffness, and how far the weight stretches the spring."""
+    def derived(self, theta, scene):
         square = (2 * math.pi / theta["period"]) ** 2
         return {
             "stiffness": (theta["m1"] * square, "N/m"),

@@ -12,10 +12,7 @@ has that angle. Drag on the way from there is neglected.
 A throw, a swing that is under way, a body that was let go before the clip begins.
 """
 
-from collections.abc import Mapping
-
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
 
 SPACE = ("start_velocity_x", "start_velocity_y", "start_velocity_z")
 PLANE = SPACE[:2]
@@ -24,12 +21,9 @@ LAUNCH = "launch_angle"
 
 
 class StartVelocity(Effect, where=lambda scene: "start_velocity" in scene.laws):
-    """The velocity in the first frame; each clip has its own."""
-
     name = "start_velocity"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Its components in the plane (and a launcher's angle), or the speed along the path."""
+    def parameters(self, scene):
         found = [
             Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
             for name in (SPACE[: scene.num_axes] if scene.is_thrown else PATH)
@@ -39,21 +33,18 @@ class StartVelocity(Effect, where=lambda scene: "start_velocity" in scene.laws):
             found.append(Parameter(LAUNCH, "rad", prior, prior.mean, "nuisance", step=None))
         return tuple(found)
 
-    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
-        """In the plane."""
+    def start_velocity(self, theta, scene):
         if not scene.is_thrown:
             return None
         components = [theta[name] for name in SPACE[: scene.num_axes]]
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
-    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
-        """Along the path, of object 1."""
+    def start_speed(self, theta, scene):
         if scene.is_thrown:
             return None
         return scene.only(theta[PATH[0]], 0)
 
-    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """The speed of a throw and its angle over the horizontal; the speed at a launcher."""
+    def derived(self, theta, scene):
         if not scene.is_thrown:
             return {}
         x, y, *z = (theta[name] for name in SPACE[: scene.num_axes])

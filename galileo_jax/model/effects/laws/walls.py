@@ -13,20 +13,16 @@ Source: Newton, Principia, laws of motion, scholium (1687); Walton (1993), in: P
 flow (the impulse along the wall).
 """
 
-from galileo_jax.model.effects.effect import Effect, Surroundings, Theta, Walls
-from galileo_jax.model.parameters import Normal, Parameter, Uniform
+from galileo_jax.model.effects import Effect, Normal, Parameter, Uniform, Walls
 
 END_SD_M = 0.003  # as well as a rail's face is measured, or marked in a picture
 ENDS = ("from", "to")
 
 
 class StraightWalls(Effect, where=lambda scene: "walls" in scene.laws):
-    """All declared walls: one restitution, one grip, and where exactly each of them is."""
-
     name = "walls"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Restitution and grip of all walls; of each how far either end is off, to its left."""
+    def parameters(self, scene):
         place = Normal(0.0, END_SD_M)
         return (
             Parameter("wall_restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
@@ -38,8 +34,7 @@ class StraightWalls(Effect, where=lambda scene: "walls" in scene.laws):
             ),
         )
 
-    def walls(self, theta: Theta, scene: Surroundings) -> Walls:
-        """The walls, as measured."""
+    def walls(self, theta, scene):
         restitution = theta["wall_restitution"]
         xp = restitution.__array_namespace__()
         found = []

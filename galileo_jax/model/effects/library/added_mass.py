@@ -14,22 +14,19 @@ Introduction to Fluid Dynamics (1967), section 6.8.
 Confused with: scale_error, frame_rate: each of them acts like another gravity; rod_mass.
 """
 
-from galileo_jax.model.effects.air import undeclared_odds
-from galileo_jax.model.effects.effect import (
+from galileo_jax.model.effects import (
     PENDULUM,
-    Array,
     Effect,
-    Force,
-    Push,
-    State,
+    LogNormal,
+    LongTailed,
+    Parameter,
     Surroundings,
-    Theta,
+    register,
 )
+from galileo_jax.model.effects.air import undeclared_odds
 from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.model.effects.laws.pendulum import LENGTH
 from galileo_jax.model.effects.laws.spring import Spring
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, LongTailed, Parameter
 
 PRIOR = LogNormal(median=0.01, sd=1.2)  # of balls in air; where size and mass are declared: theirs
 LIQUID_PRIOR = LogNormal(median=0.2, sd=0.7)
@@ -43,51 +40,39 @@ def _shows_mass(scene: Surroundings) -> bool:
 
 @register
 class AddedMass(Effect, where=_shows_mass):
-    """Fluid that the object carries along and displaces."""
-
     name = "added_mass"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The fluid's share; none on a surface or a spring, whose masses do not show."""
+    def parameters(self, scene):
         prior = LIQUID_PRIOR if Liquid.name in scene.laws else PRIOR
         if self.name in scene.expected:
             prior = LongTailed(*scene.expected[self.name])
         return (Parameter("added_mass", "1", prior, 0.0, "effect", 0.1),)
 
-    def odds(self, theta: Theta, scene: Surroundings) -> float:
+    def odds(self, theta, scene):
         """High where more is found than a ball of known size and mass carries along in air.
 
         A fluid that nobody declared is as likely as if nothing had been.
         """
         return undeclared_odds(self.name, theta, scene, PRIOR)
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
-        """The lift, on a straight path and on a pendulum's circle."""
+    def force(self, theta, scene):
         if Liquid.name in scene.laws or scene.is_thrown:
             return None
         lift = (LIFT * theta["added_mass"] * theta["m1"] * scene.gravity)[..., None]
         if PENDULUM not in scene.laws:
             return lambda state: -lift
         length = theta[LENGTH][..., None]
+        return lambda state: lift * lift.__array_namespace__().sin(state.path_m / length)
 
-        def push(state: State):
-            return lift * lift.__array_namespace__().sin(state.path_m / length)
-
-        return push
-
-    def push(self, theta: Theta, scene: Surroundings) -> Push | None:
-        """The lift of what flies, and the weight that its inertia does not share."""
+    def push(self, theta, scene):
         if not scene.is_thrown:
             return None
         # The engine adds gravity to forces over the inertia: what is carried along weighs nothing.
         upward = (LIFT + 1.0) * theta["added_mass"] * theta["m1"] * scene.gravity
 
-        def lift(velocity_m_s: Array, time_s: Array) -> Array:
-            xp = velocity_m_s.__array_namespace__()
-            return upward * xp.asarray([axis == 1 for axis in range(scene.num_axes)])
+        xp = upward.__array_namespace__()
+        lift = upward * xp.asarray([axis == 1 for axis in range(scene.num_axes)])
+        return lambda velocity_m_s, time_s: lift
 
-        return lift
-
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
-        """The fluid's that comes along."""
+    def inertia(self, theta, scene):
         return theta["added_mass"][..., None]

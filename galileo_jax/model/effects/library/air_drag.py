@@ -10,10 +10,8 @@ Confused with: viscous_drag where speeds span less than a factor of two or so; a
 friction k where they hardly change.
 """
 
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 from galileo_jax.model.effects.air import expected_odds
-from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
 
 PRIOR = LogNormal(median=0.3, sd=1.2)
 # A ball: 3e-4 (table tennis, golf) to 0.015 (basketball).
@@ -22,24 +20,15 @@ FALL_PRIOR = LogNormal(median=0.003, sd=1.5)
 
 @register
 class AirDrag(Effect):
-    """Air drag on all objects, quadratic in the speed."""
-
     name = "air_drag"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The drag constant c."""
+    def parameters(self, scene):
         prior = PRIOR if scene.has_surface else FALL_PRIOR
         return (Parameter("air_drag", "kg/m", prior, 0.0, "effect", 0.1),)
 
-    def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """High where it is that of air on a ball of known size, in a high fall or in space."""
+    def odds(self, theta, scene):
         return expected_odds(self.name, theta, scene, FALL_PRIOR)
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force -c v |v|."""
+    def force(self, theta, scene):
         constant = theta["air_drag"][..., None]
-
-        def drag(state: State):
-            return -constant * state.speed_m_s * abs(state.speed_m_s)
-
-        return drag
+        return lambda state: -constant * state.speed_m_s * abs(state.speed_m_s)

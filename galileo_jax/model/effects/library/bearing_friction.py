@@ -9,36 +9,14 @@ Source: Squire (1986), Pendulum damping, Am. J. Phys. 54, 984.
 Confused with: viscous_drag in a clip of a few swings of nearly the same size.
 """
 
-from galileo_jax.model.effects.effect import (
-    PENDULUM,
-    Array,
-    Effect,
-    Friction,
-    State,
-    Surroundings,
-    Theta,
-)
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
-
-PRIOR = LogNormal(median=0.005, sd=1.0)
+from galileo_jax.model.effects import PENDULUM, Effect, LogNormal, Parameter, register
 
 
 @register
 class BearingFriction(Effect, where=lambda scene: PENDULUM in scene.laws):
-    """Dry friction in a pendulum's bearing."""
-
     name = "bearing_friction"
+    unknowns = (Parameter("bearing_friction", "1", LogNormal(0.005, 1.0), 0.0, "effect", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The coefficient k; none but for a pendulum."""
-        return (Parameter("bearing_friction", "1", PRIOR, 0.0, "effect", 0.1),)
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficient."""
+    def friction(self, theta, scene):
         own = theta["bearing_friction"][..., None]
-
-        def law(state: State, k: Array) -> Array:
-            return k + own
-
-        return law
+        return lambda state, k: k + own

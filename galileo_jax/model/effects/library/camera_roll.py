@@ -10,9 +10,8 @@ in the picture tells; `vertical_sd_deg` allows for it in every model.
 
 import math
 
-from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, register
+from galileo_jax.model.effects.effect import ANGLE
 
 PRIOR = Normal(0.0, math.radians(2.0))
 
@@ -24,15 +23,9 @@ def _shows_gravity(scene: Surroundings) -> bool:
 
 @register
 class CameraRoll(Effect, where=_shows_gravity):
-    """The camera was rolled about its line of sight."""
-
     name = "camera_roll"
+    unknowns = (Parameter("camera_roll", "rad", PRIOR, 0.0, "effect", 0.05),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The roll; none but in the plane of a picture whose vertical is taken at its word."""
-        return (Parameter("camera_roll", "rad", PRIOR, 0.0, "effect", 0.05),)
-
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
-        """Of gravity in the plane."""
+    def tilt(self, theta, scene):
         forward = theta["camera_roll"]
         return forward, 0.0 * forward

@@ -13,17 +13,15 @@ Ramp and table together tell them apart by 1 - cos a only, which is less than wh
 changes; a body at rest, or one that comes back up, does better.
 """
 
-from galileo_jax.model.effects.effect import (
+from galileo_jax.model.effects import (
     Array,
     Effect,
-    Force,
-    Friction,
+    Normal,
+    Parameter,
     State,
-    Surroundings,
-    Theta,
+    not_negative,
+    register,
 )
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
 
 PRIOR = Normal(0.0, 0.5)
 LEVELNESS_PRIOR = Normal(0.5, 0.5)  # along the path or level: both one sd from the middle
@@ -31,12 +29,9 @@ LEVELNESS_PRIOR = Normal(0.5, 0.5)  # along the path or level: both one sd from 
 
 @register
 class ConstantForce(Effect):
-    """A steady force on object 1."""
-
     name = "constant_force"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The force, and before a foot how level it is on the ramp."""
+    def parameters(self, scene):
         pull = Parameter("constant_force", "N", PRIOR, 0.0, "effect", 0.05)
         if not scene.crosses_foot:
             return (pull,)
@@ -46,32 +41,22 @@ class ConstantForce(Effect):
         )
         return (pull, levelness)
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force along the path."""
+    def force(self, theta, scene):
         pull = scene.only(theta["constant_force"], 0)
         if not scene.crosses_foot:
             return lambda state: pull
         xp = pull.__array_namespace__()
         less = theta["constant_force_levelness"][..., None] * (xp.cos(scene.angle_rad) - 1.0)
+        return lambda state: pull * (1.0 + _on_ramp(state) * less)
 
-        def steady(state: State) -> Array:
-            return pull * (1.0 + _on_ramp(state) * less)
-
-        return steady
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
-        """The coefficients, less by what of the weight a level force carries on the ramp."""
+    def friction(self, theta, scene):
         if not scene.crosses_foot or not scene.has_surface:
             return None
         pull = scene.only(theta["constant_force"], 0)
         xp = pull.__array_namespace__()
         level = theta["constant_force_levelness"][..., None]
         carried = level * pull * xp.tan(scene.angle_rad) / scene.weight(theta)
-
-        def law(state: State, k: Array) -> Array:
-            return xp.maximum(k * (1.0 - _on_ramp(state) * carried), xp.zeros_like(k))
-
-        return law
+        return lambda state, k: not_negative(k * (1.0 - _on_ramp(state) * carried))
 
 
 def _on_ramp(state: State) -> Array:

@@ -11,23 +11,13 @@ Confused with: scale_error (both act like another gravity, g (1 + s) against g (
 rolling; on one slope k1 and ramp_angle.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
-
-PRIOR = Normal(0.0, 0.07)
+from galileo_jax.model.effects import Effect, Normal, Parameter, register
 
 
 @register
 class FrameRate(Effect):
-    """The declared frame rate is wrong."""
-
     name = "frame_rate"
+    unknowns = (Parameter("frame_rate", "1", Normal(0.0, 0.07), 0.0, "effect", step=None),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The relative error r of times; no rollout depends on it."""
-        return (Parameter("frame_rate", "1", PRIOR, 0.0, "effect", step=None),)
-
-    def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The true time since the first frame."""
+    def time(self, time_s, theta, scene):
         return time_s * (1.0 + theta["frame_rate"])

@@ -9,23 +9,15 @@ Confused with: a release before the first frame (release_instant), where the fir
 are missing.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
 PRIOR = LogNormal(median=0.3, sd=1.0)
 
 
 @register
 class InitialPush(Effect, where=lambda scene: not scene.starts_moving):
-    """Object 1 is pushed at the release."""
-
     name = "initial_push"
+    unknowns = (Parameter("initial_push", "m/s", PRIOR, 0.0, "effect", 0.1, per_clip=True),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The speed; none of what moves already when it is first seen."""
-        return (Parameter("initial_push", "m/s", PRIOR, 0.0, "effect", 0.1, per_clip=True),)
-
-    def start_speed(self, theta: Theta, scene: Surroundings) -> Array:
-        """The speed, of object 1."""
+    def start_speed(self, theta, scene):
         return scene.only(theta["initial_push"], 0)

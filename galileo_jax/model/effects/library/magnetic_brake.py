@@ -11,30 +11,20 @@ Confused with: friction_patch where the speed hardly changes inside; viscous_dra
 zone is the whole path.
 """
 
-from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 from galileo_jax.model.effects.zone import share_inside, zone_parameters
-from galileo_jax.model.parameters import LogNormal, Parameter
-
-PRIOR = LogNormal(median=1.0, sd=1.2)
 
 
 @register
 class MagneticBrake(Effect, where=lambda scene: scene.has_surface):
-    """A zone in which object 1 is braked in proportion to its speed."""
-
     name = "magnetic_brake"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The drag constant b, and the zone; none in a fall."""
-        strength = Parameter("magnetic_brake", "kg/s", PRIOR, 0.0, "effect", 0.1)
+    def parameters(self, scene):
+        strength = Parameter("magnetic_brake", "kg/s", LogNormal(1.0, 1.2), 0.0, "effect", 0.1)
         return (strength, *zone_parameters(self.name, scene))
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force -b v inside."""
+    def force(self, theta, scene):
         constant = scene.only(theta["magnetic_brake"], 0)
-
-        def brake(state: State):
-            return -constant * state.speed_m_s * share_inside(state.path_m, self.name, theta)
-
-        return brake
+        return lambda state: (
+            -constant * state.speed_m_s * share_inside(state.path_m, self.name, theta)
+        )

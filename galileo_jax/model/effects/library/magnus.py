@@ -17,10 +17,9 @@ steady backspin lifts almost evenly.
 
 import math
 
+from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter, Surroundings, register
 from galileo_jax.model.effects.air import AIR_KG_M3
-from galileo_jax.model.effects.effect import SPIN, Array, Effect, Push, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.model.effects.effect import SPIN
 
 LIFT = "magnus_lift"
 SPIN_PRIOR = Normal(0.0, 200.0)  # a table-tennis ball that is cut: 500 rad/s and more
@@ -30,12 +29,9 @@ SLOW_M_S, LEAST_RAD_S = 1e-3, 1e-3  # at rest S has no value, and without spin n
 
 @register
 class Magnus(Effect, where=lambda scene: scene.moves_in_plane):
-    """Lift on a spinning ball in flight."""
-
     name = "magnus"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The spin, known or not, and the lift per spin; none but in a flight."""
+    def parameters(self, scene):
         found = []
         for name, axis in _spins(scene):
             known = scene.expected.get(f"{SPIN}_{axis}")
@@ -44,13 +40,12 @@ class Magnus(Effect, where=lambda scene: scene.moves_in_plane):
         lift = Parameter(LIFT, "1", LIFT_PRIOR, LIFT_PRIOR.median, "effect", 0.1)
         return (*found, lift)
 
-    def push(self, theta: Theta, scene: Surroundings) -> Push:
-        """The force across the velocity."""
+    def push(self, theta, scene):
         radius = scene.half_height_m[0]
         size = theta[LIFT] * (0.5 * AIR_KG_M3 * math.pi * radius**3)
         spin = [theta[name] for name, _ in _spins(scene)]
 
-        def lift(velocity_m_s: Array, time_s: Array) -> Array:
+        def lift(velocity_m_s, time_s):
             xp = velocity_m_s.__array_namespace__()
             if scene.num_axes == 2:
                 x, y = velocity_m_s

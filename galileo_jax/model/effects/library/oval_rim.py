@@ -13,9 +13,7 @@ Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. 
 Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, register
 
 PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
 
@@ -27,20 +25,16 @@ def _can_meet(scene: Surroundings) -> bool:
 
 @register
 class OvalRim(Effect, where=_can_meet):
-    """How far from round pucks are that are seen from above."""
-
     name = "oval_rim"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Two of every puck; none of what is not seen from above, or has nothing to meet."""
+    def parameters(self, scene):
         return tuple(
             Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
             for i in range(len(scene.names))
             for name in _names(i)
         )
 
-    def oval(self, theta: Theta, scene: Surroundings) -> Array:
-        """Shares of the radii."""
+    def oval(self, theta, scene):
         rows = [[theta[name] for name in _names(i)] for i in range(len(scene.names))]
         xp = rows[0][0].__array_namespace__()
         return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)

@@ -11,9 +11,7 @@ The direction of travel in the picture and friction on the table tell them apart
 
 import math
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, register
 
 PRIOR = Normal(0.0, math.radians(2.0))
 
@@ -25,15 +23,9 @@ def _has_ramp(scene: Surroundings) -> bool:
 
 @register
 class RampAngle(Effect, where=_has_ramp):
-    """The declared angle of the ramp is wrong."""
-
     name = "ramp_angle"
+    unknowns = (Parameter("ramp_angle", "rad", PRIOR, 0.0, "effect", 0.05),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much steeper the ramp is; none where nothing is on it, or in a fall."""
-        return (Parameter("ramp_angle", "rad", PRIOR, 0.0, "effect", 0.05),)
-
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
-        """Of the ramp alone."""
+    def tilt(self, theta, scene):
         steeper = theta["ramp_angle"]
         return steeper, 0.0 * steeper

@@ -10,23 +10,15 @@ Source: kinematics; Brown and Cox (2009), Innovative uses of video analysis, Phy
 Confused with: static_friction (a late start); initial_push of the opposite sign.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
 PRIOR = LogNormal(median=0.15, sd=1.0)
 
 
 @register
 class ReleaseDelay(Effect, where=lambda scene: not scene.starts_moving):
-    """Object 1 is released later than in the first frame."""
-
     name = "release_delay"
+    unknowns = (Parameter("release_delay", "s", PRIOR, 0.0, "effect", step=None, per_clip=True),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The delay; no rollout depends on it. None where nothing is let go."""
-        return (Parameter("release_delay", "s", PRIOR, 0.0, "effect", step=None, per_clip=True),)
-
-    def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The time since the true release."""
+    def time(self, time_s, theta, scene):
         return time_s - theta["release_delay"]

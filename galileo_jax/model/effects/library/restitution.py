@@ -9,21 +9,13 @@ Source: Newton, Principia, laws of motion, scholium (1687); Stronge, Impact Mech
 Confused with: the mass ratio, where only object 2 is seen after the hit.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Parameter, Uniform
+from galileo_jax.model.effects import Effect, Parameter, Uniform, register
 
 
 @register
 class Restitution(Effect, where=lambda scene: len(scene.names) > 1):
-    """Objects bounce when they collide."""
-
     name = "restitution"
+    unknowns = (Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "effect", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The coefficient e; none where there is nothing to hit."""
-        return (Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "effect", 0.1),)
-
-    def restitution(self, theta: Theta, scene: Surroundings) -> Array:
-        """The coefficient."""
+    def restitution(self, theta, scene):
         return theta["restitution"]

@@ -13,28 +13,18 @@ Confused with: scale_error, frame_rate and a larger k on one slope; the table te
 the impact the mass.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
-PRIOR = LogNormal(median=0.45, sd=0.4)
 ON_WHEELS = 0.05  # odds that a box has some: a toy car, a cart
 
 
 @register
 class Rolling(Effect, where=lambda scene: scene.has_surface and not any(scene.rolls[:1])):
-    """Object 1 rolls instead of sliding."""
-
     name = "rolling"
+    unknowns = (Parameter("rolling", "1", LogNormal(0.45, 0.4), 0.0, "effect", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The share beta; none in a fall, and none where object 1 is declared to roll."""
-        return (Parameter("rolling", "1", PRIOR, 0.0, "effect", 0.1),)
-
-    def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """Low of a box."""
+    def odds(self, theta, scene):
         return ON_WHEELS if any(scene.is_box[:1]) else 1.0
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
-        """The share, of object 1."""
+    def inertia(self, theta, scene):
         return scene.only(theta["rolling"], 0)

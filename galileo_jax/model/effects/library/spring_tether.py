@@ -11,17 +11,7 @@ Source: Hooke, De potentia restitutiva (1678).
 Confused with: constant_force and k1 on a short path; air_drag in part (both grow on the way).
 """
 
-from galileo_jax.model.effects.effect import (
-    Array,
-    Effect,
-    Force,
-    Friction,
-    State,
-    Surroundings,
-    Theta,
-)
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter, register
 
 PRIOR = LogNormal(median=1.0, sd=1.2)
 STRAIGHTNESS_PRIOR = Normal(0.5, 0.5)  # led round the foot or free: both one sd from the middle
@@ -29,12 +19,9 @@ STRAIGHTNESS_PRIOR = Normal(0.5, 0.5)  # led round the foot or free: both one sd
 
 @register
 class SpringTether(Effect):
-    """A spring pulls object 1 back to its start."""
-
     name = "spring_tether"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The stiffness K, and past a foot how straight it pulls."""
+    def parameters(self, scene):
         stiffness = Parameter("spring_tether", "N/m", PRIOR, 0.0, "effect", 0.1)
         if not scene.crosses_foot:
             return (stiffness,)
@@ -44,8 +31,7 @@ class SpringTether(Effect):
         )
         return (stiffness, straightness)
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The pull back."""
+    def force(self, theta, scene):
         stiffness = scene.only(theta["spring_tether"], 0)
         start = scene.start_path_m[0]
         if not scene.crosses_foot:
@@ -55,14 +41,13 @@ class SpringTether(Effect):
         cos = stiffness.__array_namespace__().cos(scene.angle_rad)
         nearer = straight * start * (cos - 1.0)
 
-        def pull(state: State) -> Array:
+        def pull(state):
             on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
             return -stiffness * (state.path_m - start - on_table * nearer)
 
         return pull
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
-        """The coefficients, less by what of the weight a straight band carries on the table."""
+    def friction(self, theta, scene):
         if not scene.crosses_foot or not scene.has_surface:
             return None
         stiffness = scene.only(theta["spring_tether"], 0)
@@ -71,7 +56,7 @@ class SpringTether(Effect):
         lifts = stiffness * height_m * theta["spring_tether_straightness"][..., None]
         carried = lifts / scene.weight(theta)
 
-        def law(state: State, k: Array) -> Array:
+        def law(state, k):
             on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
             return k * (1.0 - on_table * carried)
 

@@ -20,9 +20,7 @@ left, g cos a (tan a - k - s):
 
 import math
 
-from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
 PRIOR = LogNormal(median=0.1, sd=1.0)
 SLOW_M_S = 0.02
@@ -32,15 +30,10 @@ LEAST_SHARE = 1e-3
 
 @register
 class StaticFriction(Effect, where=lambda scene: scene.has_surface):
-    """Friction is larger at rest than in motion."""
-
     name = "static_friction"
+    unknowns = (Parameter("static_friction", "1", PRIOR, 0.0, "effect", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The extra coefficient s; none in a fall."""
-        return (Parameter("static_friction", "1", PRIOR, 0.0, "effect", 0.1),)
-
-    def odds(self, theta: Theta, scene: Surroundings) -> float:
+    def odds(self, theta, scene):
         """High where it makes the start late: of all s its prior holds few for that.
 
         What it competes with is not that some s is there, but that one is there that shows: the
@@ -58,15 +51,10 @@ class StaticFriction(Effect, where=lambda scene: scene.has_surface):
         share = _share_below(most) - _share_below(least)
         return 1.0 / max(share, LEAST_SHARE) if least < extra < most else 1.0
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the speeds."""
+    def friction(self, theta, scene):
         extra = theta["static_friction"][..., None]
-
-        def law(state: State, k: Array) -> Array:
-            xp = k.__array_namespace__()
-            return k + extra * xp.exp(-((state.speed_m_s / SLOW_M_S) ** 2))
-
-        return law
+        xp = extra.__array_namespace__()
+        return lambda state, k: k + extra * xp.exp(-((state.speed_m_s / SLOW_M_S) ** 2))
 
 
 def _share_below(extra: float) -> float:

@@ -11,9 +11,7 @@ Confused with: a larger k where v_s is above all speeds; static_friction where i
 below them; constant_force and air_drag in part (they change the acceleration with speed too).
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
 PRIOR = LogNormal(median=1.0, sd=1.0)
 SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
@@ -21,25 +19,14 @@ SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
 
 @register
 class Stribeck(Effect, where=lambda scene: scene.has_surface):
-    """Friction falls with the speed."""
-
     name = "stribeck"
+    unknowns = (
+        Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
+        Parameter("stribeck_speed", "m/s", SPEED_PRIOR, SPEED_PRIOR.median, "effect", 0.1),
+    )
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much more friction there is at low speed, and up to which; none in a fall."""
-        usual = SPEED_PRIOR.median  # means nothing while the strength is absent
-        return (
-            Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
-            Parameter("stribeck_speed", "m/s", SPEED_PRIOR, usual, "effect", 0.1),
-        )
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the speeds."""
+    def friction(self, theta, scene):
         excess = theta["stribeck"][..., None]
         speed = theta["stribeck_speed"][..., None]
-
-        def law(state: State, k: Array) -> Array:
-            xp = k.__array_namespace__()
-            return k * (1.0 + excess * xp.exp(-abs(state.speed_m_s) / speed))
-
-        return law
+        xp = excess.__array_namespace__()
+        return lambda state, k: k * (1.0 + excess * xp.exp(-abs(state.speed_m_s) / speed))

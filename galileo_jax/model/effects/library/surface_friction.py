@@ -6,30 +6,15 @@ Source: Amontons (1699); Coulomb (1785): the coefficient belongs to the pair of 
 Confused with: table_tilt; friction_patch from the foot on; in part constant_force.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
-
-PRIOR = Normal(0.0, 0.1)
+from galileo_jax.model.effects import Effect, Normal, Parameter, not_negative, register
 
 
 @register
 class SurfaceFriction(Effect, where=lambda scene: scene.has_table):
-    """Object 1 has another friction coefficient on the table."""
-
     name = "surface_friction"
+    unknowns = (Parameter("surface_friction", "1", Normal(0.0, 0.1), 0.0, "effect", 0.05),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much rougher the table is; none without a table."""
-        return (Parameter("surface_friction", "1", PRIOR, 0.0, "effect", 0.05),)
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the places."""
+    def friction(self, theta, scene):
         rougher = scene.only(theta["surface_friction"], 0)
-
-        def law(state: State, k: Array) -> Array:
-            xp = k.__array_namespace__()
-            on_table = xp.maximum(k + rougher, xp.zeros_like(k))
-            return xp.where(state.is_on_ramp, k, on_table)
-
-        return law
+        xp = rougher.__array_namespace__()
+        return lambda state, k: xp.where(state.is_on_ramp, k, not_negative(k + rougher))

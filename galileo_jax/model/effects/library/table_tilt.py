@@ -13,28 +13,20 @@ frictions on the table, where both objects move: only the direction in the pictu
 import math
 from dataclasses import replace
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
-
-PRIOR = Normal(0.0, math.radians(1.5))
+from galileo_jax.model.effects import Effect, Normal, Parameter, register
 
 
 @register
 class TableTilt(Effect, where=lambda scene: scene.has_table or scene.is_level):
-    """The table is not level."""
-
     name = "table_tilt"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The table's slope, from above both; none without a table."""
-        tilt = Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05)
+    def parameters(self, scene):
+        tilt = Parameter("table_tilt", "rad", Normal(0.0, math.radians(1.5)), 0.0, "effect", 0.05)
         if scene.is_level:
             return (tilt, replace(tilt, name="table_tilt_y"))
         return (tilt,)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
-        """Of the table alone."""
+    def tilt(self, theta, scene):
         slope = theta["table_tilt"]
         if scene.is_level:
             return slope, theta["table_tilt_y"]

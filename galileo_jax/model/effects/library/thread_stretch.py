@@ -9,23 +9,13 @@ Source: Hooke, De potentia restitutiva (1678); Landau and Lifshitz, Mechanics (1
 Confused with: a longer thread where swings are small and nobody declared its length.
 """
 
-from galileo_jax.model.effects.effect import PENDULUM, Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
-
-PRIOR = LogNormal(median=0.01, sd=0.7)
+from galileo_jax.model.effects import PENDULUM, Effect, LogNormal, Parameter, register
 
 
 @register
 class ThreadStretch(Effect, where=lambda scene: PENDULUM in scene.laws):
-    """The thread of a pendulum stretches."""
-
     name = "thread_stretch"
+    unknowns = (Parameter("thread_stretch", "m", LogNormal(0.01, 0.7), 0.0, "effect", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The stretch by the weight; none but for a pendulum."""
-        return (Parameter("thread_stretch", "m", PRIOR, 0.0, "effect", 0.1),)
-
-    def stretch(self, theta: Theta, scene: Surroundings) -> Array:
-        """How far."""
+    def stretch(self, theta, scene):
         return theta["thread_stretch"]

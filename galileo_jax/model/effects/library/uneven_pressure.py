@@ -16,29 +16,23 @@ Robotics Res. 15, 557 (a limit surface about the centre of pressure).
 Confused with: nothing where the turning is in the data; else hardly seen at all.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter, register
 
 PRIOR = Normal(0.0, 0.15)  # of a radius: a felt or a burr on one side
 
 
 @register
 class UnevenPressure(Effect, where=lambda scene: scene.is_level):
-    """Where pucks that are seen from above press on the table."""
-
     name = "uneven_pressure"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Two of every puck; none of what is not seen from above."""
+    def parameters(self, scene):
         return tuple(
             Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
             for i in range(len(scene.names))
             for name in self._names(i)
         )
 
-    def pressure(self, theta: Theta, scene: Surroundings) -> Array:
-        """Shares of the radii."""
+    def pressure(self, theta, scene):
         rows = [[theta[name] for name in self._names(i)] for i in range(len(scene.names))]
         xp = rows[0][0].__array_namespace__()
         return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)

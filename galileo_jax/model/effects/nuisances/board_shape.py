@@ -17,9 +17,8 @@ from typing import Any
 
 from numpy.polynomial import legendre
 
-from galileo_jax.model.effects.effect import Array, Effect, Force, Friction, State, Surroundings
+from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings
 from galileo_jax.model.effects.effect import Theta as Theta
-from galileo_jax.model.parameters import Normal, Parameter
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
 
 LENGTH = "board_length"  # in `Surroundings.expected`: of the part that is seen, as measured
@@ -32,8 +31,7 @@ class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
 
     name = "board_slope"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The c_n, rad; none where the path is straight."""
+    def parameters(self, scene):
         names = [f"{self.name}_{n}" for n in range(MOST + 1)]
         return tuple(
             Parameter(name, "rad", Normal(*scene.expected[name]), 0.0, "nuisance", 0.1)
@@ -41,22 +39,20 @@ class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
             if name in scene.expected
         )
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """What the true slope adds to the pull down the mean one."""
+    def force(self, theta, scene):
         weight = scene.weight(theta)
         xp = weight.__array_namespace__()
         angle = xp.asarray(scene.angle_rad)
 
-        def pull(state: State) -> Array:
+        def pull(state):
             turned, _ = self._slope(state.path_m, theta, scene)
             return weight * (xp.sin(angle + turned) - xp.sin(angle))
 
         return pull
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """Coefficients as they act on a force across the board of m g cos(mean angle)."""
+    def friction(self, theta, scene):
 
-        def law(state: State, k: Array) -> Array:
+        def law(state, k):
             xp = k.__array_namespace__()
             angle, gravity = xp.asarray(scene.angle_rad), xp.asarray(scene.gravity)[..., None]
             turned, bend = self._slope(state.path_m, theta, scene)
@@ -65,8 +61,7 @@ class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
 
         return law
 
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres on the bent path, where the engine has them on a straight one."""
+    def measure(self, position_m, theta, scene):
         xp = position_m.__array_namespace__()
         start = xp.asarray(scene.start_m)[:, :, None]
         angle = xp.asarray(scene.angle_rad)

@@ -1,7 +1,6 @@
 """Contact gap: bodies that touch a second time do so further apart than when they met."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import HalfNormal, Parameter
+from galileo_jax.model.effects import Effect, HalfNormal, Parameter
 
 # Half of a box 60 mm deep, turned by some four degrees; what it travels at 1 m/s in the
 # millisecond or two of a hit is as much.
@@ -18,11 +17,7 @@ class ContactGap(Effect, where=lambda scene: len(scene.names) > 1 and not scene.
     """
 
     name = "contact_gap"
+    unknowns = (Parameter("contact_gap", "m", PRIOR, 0.0, "nuisance", 0.2),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much further, m; none where there is nothing to hit."""
-        return (Parameter("contact_gap", "m", PRIOR, 0.0, "nuisance", 0.2),)
-
-    def overlap(self, theta: Theta, scene: Surroundings) -> Array:
-        """How much further."""
+    def overlap(self, theta, scene):
         return theta["contact_gap"]

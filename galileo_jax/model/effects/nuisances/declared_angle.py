@@ -1,7 +1,7 @@
 """Declared angle: read off a picture or a protractor, it is known to so and so many tenths."""
 
-from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
+from galileo_jax.model.effects.effect import ANGLE
 
 
 class DeclaredAngle(Effect, where=lambda scene: ANGLE in scene.expected):
@@ -14,12 +14,10 @@ class DeclaredAngle(Effect, where=lambda scene: ANGLE in scene.expected):
 
     name = ANGLE
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much steeper, rad; none where the angle is taken at its word."""
+    def parameters(self, scene):
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "rad", prior, 0.0, "nuisance", 0.1),)
 
-    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array]:
-        """Of the ramp alone."""
+    def tilt(self, theta, scene):
         steeper = theta[self.name]
         return steeper, 0.0 * steeper

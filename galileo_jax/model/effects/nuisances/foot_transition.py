@@ -1,9 +1,6 @@
 """Foot transition: how much speed a real edge keeps at the foot of the ramp."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
-
-SD = 0.05
+from galileo_jax.model.effects import Effect, Normal, Parameter
 
 
 class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.comes_down)):
@@ -16,11 +13,7 @@ class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.c
     """
 
     name = "foot_transition"
+    unknowns = (Parameter("foot_transition", "1", Normal(1.0, 0.05), 1.0, "nuisance", 0.1),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The factor on the speed."""
-        return (Parameter("foot_transition", "1", Normal(1.0, SD), 1.0, "nuisance", 0.1),)
-
-    def foot(self, theta: Theta, scene: Surroundings) -> Array:
-        """The factor."""
+    def foot(self, theta, scene):
         return theta["foot_transition"]

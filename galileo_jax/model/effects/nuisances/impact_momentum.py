@@ -1,7 +1,6 @@
 """Impact momentum: a hit of bodies does not conserve momentum along the table to the last digit."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
 
 # Half a per cent of the impulse for either body. Faces rub and lift, and what hops has no friction:
 # boxes of Bullet are off by 1.3 % (root mean square of 40).
@@ -18,13 +17,11 @@ class ImpactMomentum(Effect, where=lambda scene: len(scene.names) > 1 and not sc
 
     name = "impact_momentum"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """A factor for each hit, named after the front object."""
+    def parameters(self, scene):
         return tuple(
             Parameter(f"impact_momentum_{name}", "1", Normal(1.0, SD), 1.0, "nuisance", 0.2)
             for name in scene.names[1:]
         )
 
-    def passed_on(self, theta: Theta, scene: Surroundings) -> tuple[Array, ...]:
-        """The factors, one for each pair of neighbours."""
+    def passed_on(self, theta, scene):
         return tuple(theta[f"impact_momentum_{name}"] for name in scene.names[1:])

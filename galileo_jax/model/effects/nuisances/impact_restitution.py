@@ -1,7 +1,6 @@
 """Impact restitution: no real impact is perfectly plastic."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import HalfNormal, Parameter
+from galileo_jax.model.effects import Effect, HalfNormal, Parameter
 
 # Some impacts are plastic to the last digit, most return about a hundredth; Bullet's boxes, told
 # to be plastic, up to 0.05. More than a tenth is an effect with a name, restitution.
@@ -16,11 +15,7 @@ class ImpactRestitution(Effect, where=lambda scene: len(scene.names) > 1 and not
     """
 
     name = "impact_restitution"
+    unknowns = (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The coefficient; none where there is nothing to hit."""
-        return (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
-
-    def restitution(self, theta: Theta, scene: Surroundings) -> Array:
-        """The coefficient of restitution."""
+    def restitution(self, theta, scene):
         return theta["impact_restitution"]

@@ -1,7 +1,7 @@
 """Perspective: who films a high fall from the ground looks up, and the scale changes on the way."""
 
-from galileo_jax.model.effects.effect import FALL_LENGTH, Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
+from galileo_jax.model.effects.effect import FALL_LENGTH
 
 
 class Perspective(Effect, where=lambda scene: "perspective" in scene.expected):
@@ -20,13 +20,11 @@ class Perspective(Effect, where=lambda scene: "perspective" in scene.expected):
 
     name = "perspective"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much the scale changes; none where a fall is low enough for a level camera."""
+    def parameters(self, scene):
         prior = Normal(*scene.expected[self.name])
         return (Parameter(self.name, "1", prior, 0.0, "nuisance", step=None),)
 
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres as the pitched camera shows them."""
+    def measure(self, position_m, theta, scene):
         xp = position_m.__array_namespace__()
         length, _ = scene.expected[FALL_LENGTH]
         y = position_m[:, 1]

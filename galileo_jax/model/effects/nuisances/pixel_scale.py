@@ -1,7 +1,6 @@
 """Pixel scale: how many pixels a metre is, where nobody declared it."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Parameter
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
 
 
@@ -13,15 +12,10 @@ class PixelScale(Effect, where=lambda scene: not (scene.is_scale_known or scene.
     """
 
     name = "pixel_scale"
+    prior = LogNormal(NOMINAL_SCALE_PX_PER_M, 1.0)
+    unknowns = (Parameter("pixels_per_metre", "px/m", prior, prior.median, "main", step=None),)
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The scale, px/m; none where it is declared, or lengths are in radii of a puck."""
-        prior = LogNormal(NOMINAL_SCALE_PX_PER_M, 1.0)
-        nominal = NOMINAL_SCALE_PX_PER_M
-        return (Parameter("pixels_per_metre", "px/m", prior, nominal, "main", step=None),)
-
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The centres in nominal metres, about object 1's start (the picture's origin)."""
+    def measure(self, position_m, theta, scene):
         xp = position_m.__array_namespace__()
         origin = xp.asarray(scene.start_m[0])[:, None]
         factor = theta["pixels_per_metre"] / NOMINAL_SCALE_PX_PER_M

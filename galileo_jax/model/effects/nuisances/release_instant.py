@@ -1,7 +1,6 @@
 """Release instant: the object is let go between two frames, not on one."""
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
 
 
 class ReleaseInstant(Effect):
@@ -12,15 +11,13 @@ class ReleaseInstant(Effect):
 
     name = "release_instant"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The instant of the release after the first frame, s; none where nothing is let go."""
+    def parameters(self, scene):
         if scene.starts_moving:
             return ()
         return (
             Parameter("release_instant", "s", Normal(*scene.release_s), 0.0, "nuisance", step=None),
         )
 
-    def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
-        """The time since the release."""
+    def time(self, time_s, theta, scene):
         start = scene.release_s[0] if scene.starts_moving else theta["release_instant"]
         return time_s - start

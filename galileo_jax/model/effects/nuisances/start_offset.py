@@ -1,7 +1,7 @@
 """Start offset: each object starts a few millimetres from where it was marked."""
 
-from galileo_jax.model.effects.effect import ORIGIN, Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter
+from galileo_jax.model.effects.effect import ORIGIN
 
 SD_M = 0.003  # a point set by hand, sizes declared to a millimetre
 
@@ -15,8 +15,7 @@ class StartOffset(Effect, where=lambda scene: scene.has_table):
 
     name = "start_offset"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """One per object, m."""
+    def parameters(self, scene):
         _, origin_sd_m = scene.expected.get(ORIGIN, (0.0, 0.0))
         sd_m = (SD_M**2 + origin_sd_m**2) ** 0.5
         return tuple(
@@ -24,7 +23,6 @@ class StartOffset(Effect, where=lambda scene: scene.has_table):
             for name in scene.names
         )
 
-    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """Moves every centre along its surface."""
+    def start(self, path_m, theta, scene):
         offsets = [theta[f"start_offset_{name}"] for name in scene.names]
         return path_m + offsets[0].__array_namespace__().stack(offsets, axis=-1)

@@ -10,8 +10,7 @@ Source: four runs of one block on one board (docs/explanation/real_data.md); Gel
 Data Analysis Using Regression and Multilevel/Hierarchical Models, ch. 12.
 """
 
-from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter
 
 SPREAD, SPREAD_FACTOR = 0.03, 1.386  # median, and the standard deviation of its logarithm
 
@@ -22,8 +21,7 @@ class TrialFriction(Effect, where=lambda scene: scene.has_surface):
     name = "trial_friction"
     spread = "friction_spread"
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The spread, which trials share, and each object's deviation; none without a surface."""
+    def parameters(self, scene):
         between = LogNormal(SPREAD, SPREAD_FACTOR)
         return (
             Parameter(self.spread, "1", between, 0.0, "latent", 0.2),
@@ -33,13 +31,8 @@ class TrialFriction(Effect, where=lambda scene: scene.has_surface):
             ),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients of this trial."""
+    def friction(self, theta, scene):
         deviation = [theta[f"trial_friction_{i + 1}"] for i in range(len(scene.names))]
         xp = deviation[0].__array_namespace__()
         factor = xp.exp(theta[self.spread][..., None] * xp.stack(deviation, axis=-1))
-
-        def law(state: State, k: Array) -> Array:
-            return k * factor
-
-        return law
+        return lambda state, k: k * factor
