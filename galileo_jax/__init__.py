@@ -14,6 +14,7 @@ The names below are public, and nothing else in the package is. None of the func
 none depends on the JAX precision of its caller. Errors that a user can mend are `InputError`.
 Everything is imported when it is first used.
 """
+# ruff: noqa: F401
 
 import ast
 from importlib import import_module
@@ -74,59 +75,7 @@ def _places() -> dict[str, tuple[str, str]]:
 
 PLACES = _places()
 
-__all__ = [
-    "Array",
-    "Cancelled",
-    "Clip",
-    "Comparison",
-    "Diagnosis",
-    "Discovery",
-    "Effect",
-    "Explanation",
-    "Fit",
-    "Force",
-    "Friction",
-    "HalfNormal",
-    "InputError",
-    "LogNormal",
-    "Look",
-    "Motion",
-    "NextExperiment",
-    "Normal",
-    "Parameter",
-    "Prediction",
-    "Proposal",
-    "Simulated",
-    "State",
-    "Surroundings",
-    "Sweep",
-    "Theta",
-    "TossFit",
-    "Track",
-    "Uniform",
-    "__version__",
-    "compare",
-    "diagnose",
-    "discover",
-    "effects",
-    "explain",
-    "export",
-    "fit",
-    "fit_tosses",
-    "label",
-    "load",
-    "load_run",
-    "look",
-    "next_experiment",
-    "predict",
-    "propose",
-    "register_effect",
-    "scenarios",
-    "simulate",
-    "sweep",
-    "track",
-    "train",
-]
+__all__ = ["__version__", *PLACES]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,6 @@ from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.options import (
     BLOCK_STEPS,
     OF_THESIS,
-    Discrepancy,
     FitOptions,
     check_choices,
     ignored_options,
@@ -40,7 +39,6 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import World, Worlds, fit_worlds
-from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 THESIS_CHAINS = 16
@@ -56,10 +54,10 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
-    discrepancy: Discrepancy = "auto",
+    discrepancy: Literal["auto", "none", "rough"] = "auto",
     motion: Literal["planar", "free"] = "planar",
     engine: str = "auto",
-    noise: NoiseModel | None = None,
+    noise: Literal["camera", "bodies", "tracker"] | None = None,
     seed: int = 0,
     pixels_per_metre: float | None = None,
     sampler: str = "mixture",

@@ -11,7 +11,6 @@ MAX_STEPS = 4000
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
-Discrepancy = Literal["auto", "none", "rough"]
 Options = TypeVar("Options")
 
 
@@ -42,7 +41,7 @@ class FitOptions:
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
-    discrepancy: Discrepancy = "auto"
+    discrepancy: Literal["auto", "none", "rough"] = "auto"
     motion: Literal["planar", "free"] = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None

@@ -1,29 +1,24 @@
-"""What `fit`, `compare` and `diagnose` have in common on the command line."""
+"""What the commands about clips have in common: their options, their notes, a fit as a table."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
-from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.commands.options import VerbParser
 from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
-    from galileo_jax.api.fit_result import Fit
-    from galileo_jax.clip.schema import Clip
+    from galileo_jax import Clip, Fit
     from galileo_jax.measurement.measure import Measurement
 
 
-def add_clip_options(parser: command.Parser, function: str, out: str) -> None:
+def add_clip_options(parser: VerbParser, out: str) -> None:
     """Adds what `fit`, `compare` and `diagnose` have in common; `out` is the help of --out."""
-    add = adder(parser, function)
-    add("effects_from", metavar="FILE.py")
-    parser.add_argument("--out", metavar="DIR", help=out)
-    add("seed", type=command.whole_number(0))
-    add("engine", choices=ENGINES, metavar=None)
-    add("pixels_per_metre", metavar="SCALE")
+    parser.add("effects_from")
+    parser.out(out)
+    parser.add("seed", "engine", "pixels_per_metre")
 
 
 def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> "list[Clip]":
@@ -56,13 +51,13 @@ def notes_on(fit: "Fit", out: Path) -> None:
         command.say(f"note: {line}")
 
 
-def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Path:
+def out_folder(out: Path | None, clips: "Sequence[Clip]", below: str = "") -> Path:
     """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it.
 
     Raises:
       InputError: it is a file, or nothing can be written there.
     """
-    folder = Path(out) if out else Path("runs") / "+".join(clip.path.stem for clip in clips)
+    folder = out or Path("runs") / "+".join(clip.path.stem for clip in clips)
     check_folder(folder)
     return folder if out else folder / below
 
@@ -81,3 +76,31 @@ def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
             text = " ".join(values)
             raise InputError(f"--correct {name}: {text!r} is not a frame, x and y") from None
     return found
+
+
+def fit_table(found: "Fit", truth: Mapping[str, float]) -> str:
+    """What the user asked for, in a few lines; with a column for the truth if it is known."""
+    from galileo_jax.inference.per_mass import SUFFIX
+    from galileo_jax.report.fit_text import chi2_text, fit_quality
+    from galileo_jax.results.shown import shown, shown_parameters, unit_text
+
+    result: Mapping[str, Any] = found.result
+    entries = shown_parameters(result)
+    title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
+    lines = [title] if entries else []
+    for name, entry in entries.items():
+        mean, sd, low, high = (shown(entry, key) for key in ("mean", "sd", "q025", "q975"))
+        interval = f"[{low}, {high}]{unit_text(entry)}"
+        true = f"{truth[name]:.4g}" if name in truth else ""
+        known = f"{mean:>10}{sd:>10}   {interval}"
+        if f"{name}{SUFFIX}" in result["derived"]:
+            known = "   not determined by this clip: only per mass, below"
+        elif not entry["identified"]:
+            known = f"   not determined by this clip: anything in {interval}"
+        lines.append(f"{name:<18}{true:>10}{known}")
+    error = result["error"]
+    lines.append(
+        f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
+        f"{error['noise']:.4f}); {result['status']}"
+    )
+    return "\n".join([*lines, *fit_quality(result)])

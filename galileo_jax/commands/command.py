@@ -22,43 +22,9 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **given: Any):
         super().__init__(allow_abbrev=False, **given)
 
-    def examples(self, *lines: str) -> None:
-        """Shows calls at the end of --help."""
-        self.formatter_class = argparse.RawDescriptionHelpFormatter
-        self.epilog = "examples:\n" + "\n".join(f"  {line}" for line in lines)
-
     def error(self, message: str) -> NoReturn:
         """Raises the complaint as an `InputError`."""
         raise InputError(f"{self.prog}: {message}; see --help")
-
-
-def whole_number(least: int) -> Callable[[str], int]:
-    """Returns a parser of whole numbers for `add_argument(type=...)`."""
-
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = least - 1
-        if value < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, {least} or more")
-        return value
-
-    return parse
-
-
-def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> None:
-    """Refuses options that this call would ignore.
-
-    `why`: where they belong, or why not here.
-
-    Raises:
-      InputError: one of them is given; names it.
-    """
-    given = {word.partition("=")[0] for word in argv}
-    for option in options:
-        if option in given:
-            raise InputError(f"{option}: {why}")
 
 
 def in_columns(known: Mapping[Any, Any]) -> str:
@@ -79,7 +45,7 @@ def say(line: str) -> None:
     console().print(line, soft_wrap=True, markup=False)
 
 
-def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None = None) -> int:
+def run(main: Callable[[Sequence[str]], object], argv: Sequence[str] | None = None) -> int:
     """Runs `main(argv)` and returns the exit code.
 
     0: done. 2: the input or the call is wrong (one line on stderr, no traceback).
@@ -87,7 +53,8 @@ def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None 
     counts it. Any other exception is a bug: traceback, exit code 1.
     """
     try:
-        return main(sys.argv[1:] if argv is None else argv) or 0
+        main(sys.argv[1:] if argv is None else argv)
+        return 0
     except InputError as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import (
     add_clip_options,
@@ -11,27 +12,21 @@ from galileo_jax.commands.clip_options import (
     out_folder,
     warn_of_tracks,
 )
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import hidden_effect
-
-if TYPE_CHECKING:
-    from galileo_jax.api.diagnose import Diagnosis
 
 NUM_CANDIDATES = 5
 NAME_WIDTH = 26  # at least, of the column of effects
 FRICTIONS = ("k1", "k2")
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Diagnoses clips; writes diagnosis.json, a page, and a run of the model it ends with."""
-    asked = vars(_parser().parse_args(argv))
-    clips = load_clips(asked.pop("tracks"), asked["pixels_per_metre"])
-    out = out_folder(asked.pop("out"), clips, "diagnosis")
-    svg = asked.pop("svg")
-    hidden = hidden_effect(clips[0])
-    from galileo_jax.api.diagnose import diagnose
-
+    asked = _parser().asked(argv)
+    clips = load_clips(asked.pop("tracks"), asked.get("pixels_per_metre"))
+    out = out_folder(asked.pop("out", None), clips, "diagnosis")
+    svg, hidden = asked.pop("svg", False), hidden_effect(clips[0])
     with progress_display() as display:
         rows: list[Mapping[str, Any]] = []
 
@@ -42,13 +37,12 @@ def main(argv: Sequence[str]) -> int | None:
                     display.print(_round_head(rows[0]))
                 display.print(_round_line(rows))
 
-        found = diagnose(clips, **asked, on_progress=display.showing(show))
+        found = gx.diagnose(clips, **asked, on_progress=display.showing(show))
         print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
         found.save(out, svg=svg)
     warn_of_tracks(found.measurements)
     command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
-    return None
 
 
 def _round_head(first: Mapping[str, Any]) -> str:
@@ -60,7 +54,7 @@ def _round_head(first: Mapping[str, Any]) -> str:
 def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
     from galileo_jax.report import diagnosis_text
-    from galileo_jax.results.shown_digits import value_text
+    from galileo_jax.results.shown import value_text
 
     row = rows[-1]
     frictions = ""
@@ -77,7 +71,7 @@ def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
+def _lines(found: "gx.Diagnosis", hidden: str | None, out: Path) -> list[str]:
     """Candidates, the verdict, and how to go on."""
     from galileo_jax.inference.fits.gradient import BEHIND, SETTLED
     from galileo_jax.report import diagnosis_text
@@ -115,18 +109,19 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     return [*lines, f"next: {found.next_command(out)}"]
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo diagnose", description=__doc__)
-    parser.add_argument("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
-    adder(parser, "diagnose")("add", metavar="auto|none|NAME")
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "diagnose",
+        __doc__,
+        "galileo diagnose clip.mp4                             what is missing is added",
+        "galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added",
+    )
+    parser.add("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    parser.add("add", metavar="auto|none|NAME")
     parser.add_argument(
         "--svg",
         action="store_true",
         help="also write the residuals before and after each effect as SVG (plots/)",
     )
-    add_clip_options(parser, "diagnose", out="folder (default runs/CLIP/diagnosis)")
-    parser.examples(
-        "galileo diagnose clip.mp4                             what is missing is added",
-        "galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added",
-    )
+    add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
     return parser

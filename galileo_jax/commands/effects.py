@@ -2,25 +2,20 @@
 
 from collections.abc import Sequence
 
+import galileo_jax as gx
 from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Prints a line for each."""
-    call = _parser().parse_args(argv)
-    from galileo_jax.api.catalogue import effects
-
-    known = effects(call.effects_from)
+    known = gx.effects(**_parser().asked(argv))
     print(command.in_columns(known["meaning"].to_dict()))
-    return None
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo effects", description=__doc__)
-    adder(parser, "effects")("effects_from", metavar="FILE.py")
-    parser.examples(
-        "galileo effects",
-        "galileo effects --effects-from my_effect.py",
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "effects", __doc__, "galileo effects", "galileo effects --effects-from my_effect.py"
     )
+    parser.add("effects_from", option="--effects-from")
     return parser

@@ -4,15 +4,19 @@ Their names, types, defaults and meanings stand once, in the function's signatur
 They are read from its source: importing it would import JAX for a --help.
 """
 
+import argparse
 import ast
 import re
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import galileo_jax
+from galileo_jax.commands import command
+from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime.errors import InputError
 
 ARGUMENT = re.compile(r"^  (\w+): (.+(?:\n    .+)*)", re.MULTILINE)  # in a docstring's Args
 WITHOUT = re.compile(r"[;.] None: ([^;]*)")  # what a default of None means
@@ -28,11 +32,13 @@ class Argument(NamedTuple):
       annotation: its type, as text.
       default: `REQUIRED` where it has none.
       meaning: from the docstring, without a full stop.
+      is_positional: it need not be given by its name.
     """
 
     annotation: str
     default: Any
     meaning: str
+    is_positional: bool
 
 
 @cache
@@ -57,47 +63,130 @@ def arguments_of(name: str) -> Mapping[str, Argument]:
             default = constants[default.id]
         value = REQUIRED if default is None else ast.literal_eval(default)
         meaning = re.sub(r"(?<!\.)\.$", "", meanings[argument.arg])
-        arguments[argument.arg] = Argument(annotation, value, meaning)
+        arguments[argument.arg] = Argument(annotation, value, meaning, argument in given.args)
     return arguments
 
 
-def adder(parser: Any, function: str, without: str = "none") -> Callable[..., None]:
-    """A function that adds options of a public function to a parser, or to a group of it.
+def whole_number(least: int) -> Callable[[str], int]:
+    """Returns a parser of whole numbers for `add_argument(type=...)`."""
 
-    `add("engine", "seed")` adds --engine and --seed. What else it is given goes to argparse's
-    `add_argument` in place of what was read; `option` is another name for the option. `without` is
-    what a default of None or () means where the docstring does not say it.
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, {least} or more")
+        return value
+
+    return parse
+
+
+EVERYWHERE: Mapping[str, Mapping[str, Any]] = {
+    "effects_from": {"metavar": "FILE.py"},
+    "seed": {"type": whole_number(0)},
+    "engine": {"choices": ENGINES, "metavar": None},
+    "pixels_per_metre": {"metavar": "SCALE"},
+    "fps": {"metavar": "HZ"},
+}
+"""What argparse is told of arguments that mean the same in every function."""
+
+
+class VerbParser(command.Parser):
+    """The parser of `galileo VERB`.
+
+    Args:
+      verb: as it is called.
+      description: of the call.
+      *examples: calls, shown at the end of --help.
+      function: the public function whose arguments are the options; that of the verb's name.
+      without: what a default of None or () means where the docstring does not say it.
     """
-    arguments = arguments_of(function)
 
-    def add(*names: str, option: str = "", **given: Any) -> None:
+    def __init__(
+        self,
+        verb: str,
+        description: str | None,
+        *examples: str,
+        function: str = "",
+        without: str = "none",
+    ):
+        super().__init__(
+            prog=f"galileo {verb}",
+            description=description,
+            argument_default=argparse.SUPPRESS,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            epilog="\n  ".join(("examples:", *examples)),
+        )
+        self._function, self._without = function or verb, without
+
+    def asked(self, argv: Sequence[str]) -> dict[str, Any]:
+        """What the call gives, by the function's arguments; it has the defaults of all others."""
+        return vars(self.parse_args(argv))
+
+    def add(self, *names: str, to: Any = None, option: str = "", **given: Any) -> None:
+        """Adds arguments of the function: `add("engine", "seed")` adds --engine and --seed.
+
+        `given` goes to argparse's `add_argument` in place of what was read; `option` is another
+        name for the option, or one for an argument that needs none; `to` a group of options.
+        """
         for name in names:
-            written = option or f"--{name.replace('_', '-')}"
-            described = _described(arguments[name], without) | given
+            argument = arguments_of(self._function)[name]
+            words = [name] if argument.is_positional and not option else [option or flag(name)]
+            described = _described(argument, self._without, bool(option))
+            described |= {**EVERYWHERE.get(name, {}), **given}
             if described.get("action") == "append":
                 described["help"] += "; may be given several times"
-            parser.add_argument(written, dest=name, **described)
+            if words != [name]:
+                described["dest"] = name
+            (to or self).add_argument(*words, **described)
 
-    return add
+    def group(self, *titles: str) -> Callable[..., None]:
+        """`add`, to a group of options with this title and description."""
+        return partial(self.add, to=self.add_argument_group(*titles))
+
+    def out(self, meaning: str) -> None:
+        """Adds --out, a folder that only the command knows of."""
+        self.add_argument("--out", type=Path, metavar="DIR", help=meaning)
 
 
-def _described(argument: Argument, without: str) -> dict[str, Any]:
-    """What argparse is told of an option."""
+def flag(name: str) -> str:
+    """The option of an argument."""
+    return f"--{name.replace('_', '-')}"
+
+
+def refuse(
+    asked: Mapping[str, Any], names: Iterable[str], why: str, flag: Callable[[str], str] = flag
+) -> None:
+    """Refuses options that a call gives and would ignore, even with their default.
+
+    Raises:
+      InputError: names the first of them, and says why.
+    """
+    for name in names:
+        if name in asked:
+            raise InputError(f"{flag(name)}: {why}")
+
+
+def _described(argument: Argument, without: str, is_option: bool) -> dict[str, Any]:
+    """What argparse is told of an argument."""
     annotation = argument.annotation.removesuffix(" | None")
     found = WITHOUT.search(argument.meaning)
     meaning = WITHOUT.sub("", argument.meaning).replace("`", "").replace("%", "%%")
+    if argument.is_positional and not is_option:
+        return {"help": meaning, "type": TYPES.get(annotation, str)}
     if annotation == "bool":
-        return {"action": "store_true", "help": f"{meaning} (default: off)"}
-    described: dict[str, Any] = {"default": argument.default}
-    shown = " (default %(default)s)"
+        given = {"action": "store_true", "default": argparse.SUPPRESS}
+        return given | {"help": f"{meaning} (default: off)"}
+    shown = f" (default {argument.default})"
     if argument.default is REQUIRED:
-        shown, described = "", {"required": True}
+        shown = ""
     elif argument.default in (None, (), ""):
         shown = f" (default: {found[1] if found else without})"
-    described["help"] = f"{meaning}{shown}"
+    described = {"help": f"{meaning}{shown}", "required": argument.default is REQUIRED}
     if annotation.startswith("Literal["):
         return described | {"choices": ast.literal_eval(annotation.removeprefix("Literal"))}
     if "Sequence[" in annotation:
-        return described | {"action": "append", "default": []}
+        return described | {"action": "append"}
     metavar = METAVARS.get(annotation, "NAME")
     return described | {"type": TYPES.get(annotation, str), "metavar": metavar}

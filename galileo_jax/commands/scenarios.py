@@ -2,23 +2,17 @@
 
 from collections.abc import Sequence
 
+import galileo_jax as gx
 from galileo_jax.commands import command
+from galileo_jax.commands.options import VerbParser
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Prints a line for each."""
-    _parser().parse_args(argv)
-    from galileo_jax.api.catalogue import scenarios
-
-    known = scenarios()
+    known = gx.scenarios(**_parser().asked(argv))
     print(command.in_columns(known["meaning"].to_dict()))
-    return None
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo scenarios", description=__doc__)
-    parser.examples(
-        "galileo scenarios",
-        "galileo scenarios | grep slope",
-    )
-    return parser
+def _parser() -> VerbParser:
+    examples = "galileo scenarios", "galileo scenarios | grep slope"
+    return VerbParser("scenarios", __doc__, *examples)

@@ -3,98 +3,80 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from galileo_jax.api.simulate import simulate
-from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser, refuse
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.check_settings import option, options_without_part
 from galileo_jax.simulation.settings import Settings
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Writes NAME.mp4 (or NAME.csv), NAME.yaml and NAME.truth.json, for a series NAME_1 and on."""
-    asked = vars(_parser().parse_args(argv))
-    out = asked.pop("out")
-    for name in ("effects", "values"):
-        asked[name] = _as_mapping(option(name), asked[name])
+    asked = _parser().asked(argv)
+    for name in {"effects", "values"} & asked.keys():
+        pairs = asked[name]
+        asked[name] = dict(pairs)
+        if name == "effects" and len(asked[name]) < len(pairs):
+            raise InputError("--effect: an effect is named twice")
+    settings = {name: value for name, value in asked.items() if name != "out"}
     # Written out with its default value an option is ignored no less; only here it shows.
-    for fields, why in options_without_part(Settings(**asked)):
-        command.refuse_ignored(argv, [option(field) for field in fields], why)
+    for fields, why in options_without_part(Settings(**settings)):
+        refuse(asked, fields, why, option)
     with progress_display() as on_progress:
-        made = simulate(out, **asked, on_progress=on_progress)
+        made = simulate(**asked, on_progress=on_progress)
     print("\n".join(map(str, made.paths)))
-    return None
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(
-        prog="galileo simulate",
-        description="Make a clip with known truth: NAME.mp4, NAME.yaml and NAME.truth.json.\n"
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "simulate",
+        "Make a clip with known truth: NAME.mp4, NAME.yaml and NAME.truth.json.\n"
         "What is not given is drawn at random; the same seed makes the same clip.",
-    )
-    parser.examples(
         "galileo simulate --seed 7 --out demo/clip.mp4",
         "galileo simulate --scenario flight --floor --effect air_drag --track-only --out ball.csv",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR/NAME.mp4", help="NAME.csv for a track"
-    )
-    add = adder(parser, "simulate")
-    add("scenario", "seed", "seconds", "fps")
-    add(
+    path = {"type": Path, "required": True, "metavar": "DIR/NAME.mp4"}
+    parser.add("out", option="--out", help="NAME.csv for a track", **path)
+    parser.add("scenario")
+    parser.add("seed", type=int)
+    parser.add("seconds", "fps")
+    parser.add(
         "values",
-        option="--set",
+        option=option("values"),
         type=_value,
-        action="append",
-        default=[],
         metavar="NAME=VALUE",
         help="a parameter of the scenario, such as k3=0.2 or floor_restitution=0.7 (default: "
         "drawn)",
+        action="append",
     )
-    add("floor", "walls", "track_only", "track_noise")
-    add = adder(parser.add_argument_group("on a ramp"), "simulate")
-    add("shapes", type=_shapes, metavar="SHAPE,...", action=None, default=None)
+    parser.add("floor", "walls", "track_only", "track_noise")
+    add = parser.group("on a ramp")
+    add("shapes", type=_shapes, metavar="SHAPE,...", action=None)
     add("angle", "release", "m1", "k1", "m2", "k2")
     add("motion", "solver", choices=None, metavar="NAME")
     add("z2", "series")
     add("like", metavar="NAME.truth.json")
-    hidden = parser.add_argument_group("what is hidden", "in the truth, and not in the yaml")
-    add = adder(hidden, "simulate")
+    add = parser.group("what is hidden", "in the truth, and not in the yaml")
     add(
         "effects",
-        option="--effect",
+        option=option("effects"),
         type=_effect,
         metavar="NAME[:PARAMETER=VALUE,...]",
         help="an effect, in SI units; what is left out is drawn (default: none)",
         action="append",
-        default=[],
     )
-    add("strength")
-    add("effects_from", metavar="FILE.py")
-    add("faults")
-    add = adder(parser.add_argument_group("filming"), "simulate")
+    add("strength", "effects_from", "faults")
+    add = parser.group("filming")
     width, height = Settings().size
-    add(
-        "size",
-        type=_size,
-        metavar="WIDTHxHEIGHT",
-        help=f"of the picture, px, even numbers (default {width}x{height})",
-    )
+    size = f"of the picture, px, even numbers (default {width}x{height})"
+    add("size", type=_size, metavar="WIDTHxHEIGHT", help=size)
     add("direction", choices=None, metavar="SIDE")
     add("no_points", "hand")
     add("camera_fault", metavar="NAME")
     add("noise", "exposure", "defocus", "missed_frames")
     return parser
-
-
-def _as_mapping(name: str, pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    mapping = dict(pairs)
-    if name == "--effect" and len(mapping) < len(pairs):
-        raise InputError("--effect: an effect is named twice")
-    return mapping
 
 
 def _effect(text: str) -> tuple[str, dict[str, float | str]]:

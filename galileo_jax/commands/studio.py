@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.commands import command
+from galileo_jax.commands.options import VerbParser, whole_number
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Serves the page until Ctrl-C; prints its address."""
     call = _parser().parse_args(argv)
     from galileo_jax.studio.server import serve
@@ -16,11 +17,15 @@ def main(argv: Sequence[str]) -> int | None:
         command.say("Only this address opens it; Ctrl-C ends it. Everything is saved at once.")
 
     serve(call.source, port=call.port, browser=call.browser, announce=announce)
-    return None
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo studio", description=__doc__)
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "studio",
+        __doc__,
+        "galileo studio clip.mp4                               one film, or a table",
+        "galileo studio trials/ --no-browser                   a folder of trials",
+    )
     parser.add_argument(
         "source",
         nargs="?",
@@ -31,7 +36,8 @@ def _parser() -> command.Parser:
     )
     parser.add_argument(
         "--port",
-        type=command.whole_number(1),
+        type=whole_number(1),
+        default=None,
         metavar="N",
         help="of this machine (default: the first free one from 8642 on)",
     )
@@ -39,10 +45,7 @@ def _parser() -> command.Parser:
         "--no-browser",
         dest="browser",
         action="store_false",
+        default=True,
         help="print the address, open no browser (default: off)",
-    )
-    parser.examples(
-        "galileo studio clip.mp4                               one film, or a table",
-        "galileo studio trials/ --no-browser                   a folder of trials",
     )
     return parser

@@ -5,18 +5,17 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import galileo_jax as gx
 from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser
 from galileo_jax.commands.progress_display import progress_display
 
 MAX_LINES = 10  # failures that are printed one by one
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Computes what is missing of a sweep, and writes its tables and its page."""
-    call = _parser().parse_args(argv)
-    from galileo_jax.sweeping.sweep import sweep
-
+    asked = _parser().asked(argv)
     with progress_display() as display:
         failures = itertools.count(1)
 
@@ -27,7 +26,7 @@ def main(argv: Sequence[str]) -> int | None:
             elif next(failures) <= MAX_LINES:
                 command.say(f"failed: {partial['failed']}: {partial['why']}")
 
-        found = sweep(**vars(call), on_progress=display.showing(show))
+        found = gx.sweep(**asked, on_progress=display.showing(show))
     for one in found.agreements:
         print(one.sentence)
     for row in found.summary:
@@ -36,27 +35,23 @@ def main(argv: Sequence[str]) -> int | None:
     count = Counter(row["status"] for row in found.summary)
     print(f"{count['done']} cells done, {count['failed']} failed")
     command.say(", ".join(map(str, [*found.tables, found.report_path])))
-    return None
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo sweep", description=__doc__)
-    parser.add_argument(
-        "config",
-        metavar="CONFIG",
-        help="a yaml file, the name of a ready one, or a folder of films and tables: each alone",
-    )
-    add = adder(parser, "sweep")
-    add("set", "multirun", metavar="KEY=VALUE")
-    add("out", metavar="DIR")
-    add("retry")
-    add = adder(parser.add_argument_group("where it is computed"), "sweep")
-    add("engine")
-    add("address", metavar="HOST:PORT")
-    add("workers", "cpus_per_worker", "gpus_per_worker", "together")
-    parser.examples(
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "sweep",
+        __doc__,
         "galileo sweep films/                                  a class: a film of each group",
         "galileo sweep thesis_ablation                         a ready config",
         "galileo sweep class.yaml --set common.method=mh       your own, with another value",
     )
+    what = "a yaml file, the name of a ready one, or a folder of films and tables: each alone"
+    parser.add("config", metavar="CONFIG", help=what)
+    parser.add("set", "multirun", metavar="KEY=VALUE")
+    parser.add("out", metavar="DIR")
+    parser.add("retry")
+    add = parser.group("where it is computed")
+    add("engine", choices=("local", "ray"))
+    add("address", metavar="HOST:PORT")
+    add("workers", "cpus_per_worker", "gpus_per_worker", "together")
     return parser

@@ -2,32 +2,26 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import galileo_jax as gx
 from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.results.shown_digits import unit_text
-
-if TYPE_CHECKING:
-    from galileo_jax.api.fit_tosses import TossFit
+from galileo_jax.results.shown import unit_text
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Fits tosses together; prints a table and writes tosses.json."""
-    asked = vars(_parser().parse_args(argv))
-    clips, out = asked.pop("clips"), Path(asked.pop("out") or "runs/tosses")
-    from galileo_jax.api.fit_tosses import DOCUMENT, fit_tosses
-
+    asked = _parser().asked(argv)
+    out = asked.pop("out", Path("runs/tosses"))
     with progress_display() as display:
-        found = fit_tosses(clips, **asked, on_progress=display)
+        found = gx.fit_tosses(**asked, on_progress=display)
     found.save(out)
     print("\n".join(_lines(found)))
-    command.say(f"{out}/{DOCUMENT}")
-    return None
+    command.say(f"{out}/tosses.json")
 
 
-def _lines(found: "TossFit") -> list[str]:
+def _lines(found: "gx.TossFit") -> list[str]:
     """The parameters; how the second half was predicted; what did not fly."""
     lines = [f"{'':<14}{'mean':>10}{'sd':>10}   95 % interval"]
     for name, told in found.parameters.items():
@@ -47,12 +41,11 @@ def _lines(found: "TossFit") -> list[str]:
     return lines
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo toss", description=__doc__)
-    parser.add_argument("clips", nargs="+", metavar="CLIP", help="csv of poses, or its yaml")
-    add = adder(parser, "fit_tosses")
-    add("window", metavar="S")
-    add("ahead")
-    parser.add_argument("--out", metavar="DIR", help="folder (default runs/tosses)")
-    parser.examples("galileo toss tosses/*.csv --ahead")
+def _parser() -> VerbParser:
+    example = "galileo toss tosses/*.csv --ahead"
+    parser = VerbParser("toss", __doc__, example, function="fit_tosses")
+    parser.add("clips", nargs="+", metavar="CLIP", help="csv of poses, or its yaml")
+    parser.add("window", metavar="S")
+    parser.add("ahead")
+    parser.out("folder (default runs/tosses)")
     return parser

@@ -5,29 +5,29 @@ from pathlib import Path
 
 import numpy as np
 
+import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import corrections, warn
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.atomic_write import check_folder, writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
 
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Writes DIR/track_px.csv, track_m.csv (if the scale is known), overlay.mp4, overlay.png."""
-    call = _parser().parse_args(argv)
-    clip = load_clip(call.clip, pixels_per_metre=call.pixels_per_metre)
+    asked = _parser().asked(argv)
+    clip = load_clip(asked["clip"], pixels_per_metre=asked.get("pixels_per_metre"))
     warn(clip.warnings)
     if clip.video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
-    out: Path = call.out or Path(f"{clip.path.stem}_track")
+    out: Path = asked.get("out", Path(f"{clip.path.stem}_track"))
     check_folder(out)
-    from galileo_jax.api.track import track
-
     with progress_display() as display:
-        found = track(clip, correct=corrections(call.correct), on_progress=display)
+        correct = corrections(asked.get("correct", ()))
+        found = gx.track(clip, correct=correct, on_progress=display)
         assert found.pixels is not None  # of a video
         with writing_into(out):
             written = found.save_tables(out)
@@ -41,7 +41,6 @@ def main(argv: Sequence[str]) -> int | None:
             "note: no csv in metres, because pixels_per_metre is not known; give --pixels-per-metre"
         )
     print("\n".join(map(str, written)))
-    return None
 
 
 def _summary(track: Track) -> list[str]:
@@ -61,28 +60,23 @@ def _summary(track: Track) -> list[str]:
     return lines
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(
-        prog="galileo track",
-        description="Track the objects of a clip. Writes csv tracks in pixels and, if the scale "
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "track",
+        "Track the objects of a clip. Writes csv tracks in pixels and, if the scale "
         "is known, in metres, and a video with the paths drawn over it.",
+        "galileo track clip.mp4",
+        "galileo track clip.mp4 --pixels-per-metre 640 --out tracked",
     )
-    parser.add_argument("clip", type=Path, metavar="CLIP", help="video or its yaml")
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="where to write (default: NAME_track)"
-    )
-    adder(parser, "track")("pixels_per_metre", metavar="SCALE")
+    parser.add("clip", type=Path, metavar="CLIP", help="video or its yaml")
+    parser.out("where to write (default: NAME_track)")
+    parser.add("pixels_per_metre")
     parser.add_argument(
         "--correct",
         nargs="+",
         action="append",
-        default=[],
         metavar=("NAME", "FRAME"),
         help="NAME FRAME X Y: where it is (pixels) in a frame in which it was lost; tracking "
         "continues from there, in addition to the yaml's corrections",
-    )
-    parser.examples(
-        "galileo track clip.mp4",
-        "galileo track clip.mp4 --pixels-per-metre 640 --out tracked",
     )
     return parser

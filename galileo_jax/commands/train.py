@@ -6,22 +6,21 @@ from typing import Any
 
 from galileo_jax.api.train import evaluate_network, train
 from galileo_jax.commands import command
-from galileo_jax.commands.options import adder
+from galileo_jax.commands.options import VerbParser, refuse
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 
-OF_TRAINING = ("--preset", "--config", "--data", "--samples", "--max-epochs", "--frames", "--seed")
 
-
-def main(argv: Sequence[str]) -> int | None:
+def main(argv: Sequence[str]) -> None:
     """Trains into --out, or tests the network of --test."""
-    asked = vars(_parser().parse_args(argv))
-    out, network = asked.pop("out"), asked.pop("test")
-    if (network is None) == (out is None):
+    asked = _parser().asked(argv)
+    network = asked.pop("test", None)
+    if (network is None) == ("out" not in asked):
         raise InputError("galileo train: one of --out DIR (train) and --test DIR expected")
     if network is not None:
-        command.refuse_ignored(argv, [*OF_TRAINING, "--engine"], "--test trains nothing")
-        return _test(network)
+        refuse(asked, tuple(asked), "--test trains nothing")
+        _test(network)
+        return
     with progress_display() as show:
 
         def on_progress(stage: str, share: float, partial: Any) -> None:
@@ -30,15 +29,15 @@ def main(argv: Sequence[str]) -> int | None:
                 stage = f"{stage}, loss {loss:.4f}, rate {rate:.0e}"
             show(stage, share, None)
 
-        done = train(out, **asked, on_progress=on_progress)
+        done = train(**asked, on_progress=on_progress)
     print(
         f"{len(done.losses)} epochs, validation loss {done.best_validation_loss:.5f}; "
         f"{done.seconds:.0f} s, of which data {done.data_seconds:.0f} s"
     )
+    out = asked["out"]
     command.console().print(
         f"{out}/network.npz, {out}/loss.svg; test it with galileo train --test {out}"
     )
-    return None
 
 
 def _test(network: Path) -> None:
@@ -49,24 +48,20 @@ def _test(network: Path) -> None:
         print(f"{name:<34}{value:>10.4g}{known}")
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(
-        prog="galileo train",
-        description="Trains the neural estimators, goes on where one stopped, and tests them.",
-    )
-    parser.examples(
+def _parser() -> VerbParser:
+    parser = VerbParser(
+        "train",
+        "Trains the neural estimators, goes on where one stopped, and tests them.",
         "galileo train --preset thesis --out networks/thesis",
         "galileo train --test networks/thesis",
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="train into it, or go on there (no default)"
-    )
+    parser.out("train into it, or go on there (no default)")
     parser.add_argument(
         "--test", type=Path, metavar="DIR", help="test its network, train nothing (no default)"
     )
-    add = adder(parser, "train")
-    add("preset", "engine", choices=None, metavar="NAME")
-    add("config", metavar="FILE")
-    add("data", metavar="DIR")
-    add("samples", "max_epochs", "frames", "seed")
+    parser.add("preset", "engine", choices=None, metavar="NAME")
+    parser.add("config", metavar="FILE")
+    parser.add("data", metavar="DIR")
+    parser.add("samples", "max_epochs", "frames")
+    parser.add("seed", type=int)
     return parser

@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from galileo_jax.comparison.consensus import Consensus
-from galileo_jax.results.shown_digits import number
+from galileo_jax.results.shown import number
 
 WIDTH_PX, HEIGHT_PX = 720, 150  # of the frame with its margins, without names
 LEFT_PX, RIGHT_PX, TOP_PX = 62, 8, 8

@@ -22,7 +22,7 @@ from galileo_jax.report.diagnosis_charts import (
 )
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
-from galileo_jax.results.shown_digits import shown
+from galileo_jax.results.shown import shown
 from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8

@@ -13,7 +13,7 @@ from galileo_jax.diagnosis.verdict import DECISIVE, UNEVEN
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
 from galileo_jax.results.command_line import command_line
-from galileo_jax.results.shown_digits import value_text
+from galileo_jax.results.shown import value_text
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.statespace.term import TERMS
 

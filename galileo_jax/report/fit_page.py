@@ -27,8 +27,14 @@ from galileo_jax.report.posterior_charts import pair_chart, trace_chart
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
-from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
-from galileo_jax.results.shown_parameters import HEADLINES, shown_parameters
+from galileo_jax.results.shown import (
+    HEADLINES,
+    interval_text,
+    number,
+    shown,
+    shown_parameters,
+    unit_text,
+)
 from galileo_jax.runtime.atomic_write import write_text
 
 PAGE = "report.html"

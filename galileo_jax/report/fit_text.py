@@ -12,8 +12,7 @@ from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.phrases import sentence
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.run import CLIP, Run
-from galileo_jax.results.shown_digits import unit_text
-from galileo_jax.results.shown_parameters import shown_parameters
+from galileo_jax.results.shown import shown_parameters, unit_text
 
 MEANINGS = {
     "mass_ratio": "m1 / m2",

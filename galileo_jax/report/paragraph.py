@@ -9,8 +9,7 @@ from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.diagnosis_text import noise_text
 from galileo_jax.report.fit_text import imperfection_text, meaning, nearness
 from galileo_jax.report.phrases import listed, sentence
-from galileo_jax.results.shown_digits import shown
-from galileo_jax.results.shown_parameters import shown_parameters
+from galileo_jax.results.shown import shown, shown_parameters
 
 BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ball"}
 FRICTION, RATIO = re.compile(r"k(\d+)"), re.compile(r"mass_ratio(?:_(\d+)_(\d+))?")

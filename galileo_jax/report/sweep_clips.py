@@ -18,8 +18,15 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.report.fit_text import fits, meaning, nearness
 from galileo_jax.report.style import object_colour
 from galileo_jax.report.video_frames import jpeg
-from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
-from galileo_jax.results.shown_parameters import HEADLINES, headlines, point_estimate
+from galileo_jax.results.shown import (
+    HEADLINES,
+    headlines,
+    interval_text,
+    number,
+    point_estimate,
+    shown,
+    unit_text,
+)
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 

@@ -14,7 +14,7 @@ from galileo_jax.clip.load import YAML_SUFFIXES
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.comparison.consensus import FEWEST, consensus
 from galileo_jax.report.class_chart import Agreement
-from galileo_jax.results.shown_digits import number
+from galileo_jax.results.shown import number
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.clip_rows import natural

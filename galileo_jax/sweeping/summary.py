@@ -12,7 +12,7 @@ from typing import Any
 
 from galileo_jax.files.tables import TABLE_FORMATS, write_table
 from galileo_jax.report.sweep_clips import verdict_words
-from galileo_jax.results.shown_parameters import headlines, point_estimate
+from galileo_jax.results.shown import headlines, point_estimate
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.settings import Diagnose, Explain
 from galileo_jax.sweeping.store import Store

@@ -1,6 +1,5 @@
 """`label`: the function and the command write the same bytes; comments and layout stay."""
 
-import inspect
 from pathlib import Path
 
 import pytest
@@ -94,13 +93,6 @@ def test_a_correction_is_replaced_and_taken_back(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=words):
             label(path, correct=wrong)
-
-
-def test_options_have_keywords_of_the_same_name() -> None:
-    parsed = vars(label_command._parser().parse_args(["clip.mp4"]))
-    assert parsed.keys() == inspect.signature(label).parameters.keys()
-    for name, parameter in list(inspect.signature(label).parameters.items())[1:]:
-        assert (parsed[name] or None) == parameter.default, name
 
 
 @pytest.mark.parametrize(

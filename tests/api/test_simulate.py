@@ -1,7 +1,5 @@
 """`simulate`: the function and the command write the same bytes, refuse with the same sentence."""
 
-import dataclasses
-import inspect
 import itertools
 import json
 import threading
@@ -16,7 +14,6 @@ from galileo_jax.commands import command
 from galileo_jax.commands import simulate as simulate_command
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import Cancelled
-from galileo_jax.simulation.settings import Settings
 
 SMALL = {"size": (160, 90), "seconds": 0.3}
 
@@ -84,21 +81,6 @@ def test_the_function_writes_what_the_command_writes(name, is_64_bit, tmp_path, 
     assert capsys.readouterr() == ("", "")
     assert contents(by_function) == contents(by_command)
     assert printed.split() == [str(by_command / path.name) for path in made.paths]
-
-
-def test_options_have_keywords_of_the_same_name_and_default():
-    keywords = {
-        name: parameter.default
-        for name, parameter in inspect.signature(simulate).parameters.items()
-        if name not in ("out", "on_progress", "cancel")
-    }
-    parsed = vars(simulate_command._parser().parse_args(["--out", "c.mp4"]))
-    del parsed["out"]
-    settings = {each.name: getattr(Settings(), each.name) for each in dataclasses.fields(Settings)}
-    assert parsed.keys() == keywords.keys() == settings.keys()
-    for name, default in keywords.items():
-        assert (parsed[name] or None) == (default or None), name
-        assert (settings[name] or None) == (default or None), name
 
 
 WRONG = [

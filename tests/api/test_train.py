@@ -1,6 +1,5 @@
 """`train`: a training of three epochs, and the command's sentences."""
 
-import inspect
 import threading
 
 import numpy as np
@@ -38,14 +37,6 @@ def test_it_trains_reports_and_goes_on(tmp_path, capsys):
     assert "3 epochs, validation loss" in capsys.readouterr().out
     first, second = (np.load(tmp_path / name / "network.npz") for name in "ab")
     assert all(np.array_equal(first[name], second[name]) for name in first.files)
-
-
-def test_options_have_keywords_of_the_same_name_and_default():
-    parsed = vars(train_command._parser().parse_args([]))
-    keywords = inspect.signature(train).parameters
-    assert parsed.keys() - {"test"} == keywords.keys() - {"on_progress", "cancel"}
-    for name in keywords.keys() - {"out", "on_progress", "cancel"}:
-        assert parsed[name] == keywords[name].default, name
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import types
 
 import pytest
 
+import galileo_jax as gx
 from galileo_jax import __main__
 from galileo_jax.commands import command
 
@@ -14,12 +15,10 @@ def galileo(*words: object) -> int:
 
 
 def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
-    from galileo_jax.api import next_experiment as module
-
     asked = {}
 
-    def fake(runs, **options):
-        asked.update(options, runs=runs)
+    def fake(**options):
+        asked.update(options)
         row = {"height": 0.15, "gain_nats": 0.6, "named": 0.93, "lead_nats": 8.0, "hit": None}
         return types.SimpleNamespace(
             hypotheses={"air_drag": 0.7, "none": 0.3},
@@ -28,13 +27,13 @@ def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
             save=lambda folder: folder,
         )
 
-    monkeypatch.setattr(module, "next_experiment", fake)
+    monkeypatch.setattr(gx, "next_experiment", fake, raising=False)
     assert galileo("next", tmp_path, "--can", "height=0.1:0.5", "--about", "k2") == 0
     out = capsys.readouterr().out
     assert "still possible: air_drag 0.700, none 0.300" in out and "0.93" in out
     assert out.splitlines()[-1].startswith("release object 1 from 0.15 m")
-    assert asked["runs"] == [tmp_path]
-    assert (asked["can"], asked["about"], asked["seed"]) == ("height=0.1:0.5", "k2", 0)
+    del asked["on_progress"]
+    assert asked == {"found": [tmp_path], "can": "height=0.1:0.5", "about": "k2"}
 
 
 @pytest.mark.parametrize(

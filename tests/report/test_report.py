@@ -20,7 +20,7 @@ from galileo_jax.report.html_page import document
 from galileo_jax.report.provenance import digest
 from galileo_jax.report.video_frames import BUDGET_BYTES, sample_frames
 from galileo_jax.results.run import load_run
-from galileo_jax.results.shown_digits import shown
+from galileo_jax.results.shown import shown
 from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
 from tests.reference_ramp import solve
 from tests.report.browser import opened

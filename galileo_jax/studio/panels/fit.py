@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from galileo_jax.report.fit_text import distance
-from galileo_jax.results.shown_digits import interval_text, shown, unit_text
+from galileo_jax.results.shown import interval_text, shown, unit_text
 from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
 from galileo_jax.studio.results import program_of
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-from galileo_jax.results.shown_digits import number, shown
+from galileo_jax.results.shown import number, shown
 
 WIDTH, HEIGHT, TOP, BOTTOM = 416, 150, 26, 38
 

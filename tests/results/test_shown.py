@@ -1,4 +1,4 @@
-"""Digits are shown where they mean something."""
+"""Digits are shown where they mean something, and a mass where something depends on it."""
 
 import math
 
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galileo_jax.results.shown_digits import number, shown
+from galileo_jax.results.shown import number, shown, shown_parameters
 
 
 def test_numbers_have_the_places_their_uncertainty_allows():
@@ -38,3 +38,28 @@ def test_what_is_shown_is_the_number_to_a_digit_worth_more_than_its_error(value,
     assert len(text.partition(".")[2]) == max(-bears, 0)
     assert float(text) == pytest.approx(value, abs=0.5001 * 10.0**bears)
     assert 10.0**bears >= share * sd * (1 - 1e-12) or bears == first
+
+
+@pytest.mark.parametrize(
+    ("parameters", "derived", "hidden"),
+    [
+        ({"m1": "kg", "k1": "1"}, {}, {"m1"}),
+        ({"m1": "kg"}, {}, {"m1"}),
+        ({"m1": "kg", "gravity": "m/s^2"}, {}, {"m1"}),
+        ({"m1": "kg", "air_drag": "kg/m"}, {"air_drag_per_mass": "1/m"}, set()),
+        ({"m1": "kg", "initial_push": "N s"}, {}, set()),
+        ({"m1": "kg", "scale_error": "1"}, {}, {"m1"}),
+        ({"m1": "kg", "period": "s"}, {"stiffness": "N/m", "stretch": "m"}, set()),
+        ({"m1": "kg", "k1": "1", "m2": "kg", "k2": "1"}, {"mass_ratio": "1"}, set()),
+    ],
+)
+def test_a_mass_that_acts_on_nothing_is_not_shown(parameters, derived, hidden):
+    rooms = {"parameters": parameters, "derived": derived}
+    result = {
+        room: {name: {"unit": unit} for name, unit in units.items()}
+        for room, units in rooms.items()
+    }
+    before = repr(result)
+    shown = shown_parameters(result)
+    assert list(shown) == [name for name in {**parameters, **derived} if name not in hidden]
+    assert repr(result) == before
