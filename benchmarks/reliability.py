@@ -31,7 +31,7 @@ from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import ADEQUATE_P
-from galileo_jax.diagnosis.verdict import DECISIVE
+from galileo_jax.diagnosis.thresholds import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure

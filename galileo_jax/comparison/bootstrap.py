@@ -28,10 +28,7 @@ NUM_STEPS = 4
 def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
     """Whitened residuals of each clip, `[point, value]`.
 
-    Args:
-      trials: the clips.
-      theta: `[point, parameter]`, in their units.
-      noise_scale: `[clip]`.
+    `theta` is `[point, parameter]`, `noise_scale` `[clip]`.
     """
     found = []
     for clip, problem in enumerate(trials.problems):
@@ -71,12 +68,16 @@ def replicates(
     each = zip(trials.problems, noise_scale, mode_size, labels, strict=True)
     noise = np.concatenate([_errors(*one, count, generator) for one in each], axis=1)
     centre = generator.standard_normal((count, len(free)))
-    base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
+
+    def predicted(z: np.ndarray) -> np.ndarray:
+        return np.concatenate(whitened(trials, trials.theta(z, fit.free), noise_scale), axis=1)
+
+    base = predicted(fit.z[None])
 
     def residual_at(moved: np.ndarray) -> np.ndarray:
         z = np.tile(fit.z, (count, 1))
         z[:, free] += moved
-        return noise + np.concatenate(_at(trials, fit, z, noise_scale), axis=1) - base
+        return noise + predicted(z) - base
 
     best, _ = _refitted(noise, centre, jacobian, residual_at)
     return np.split(best, ends, axis=1)
@@ -144,9 +145,3 @@ def _uneven(
     each = np.exp((log_variance - known_to**2 / 2) / 2)  # of a mean square of 1
     index = np.broadcast_to(label[:, None], (count, objects, axes, frames))
     return np.take_along_axis(each, index, axis=-1).reshape(count, -1)
-
-
-def _at(
-    trials: JointProblem, fit: GradientFit, z: np.ndarray, noise_scale: np.ndarray
-) -> list[np.ndarray]:
-    return whitened(trials, trials.theta(z, fit.free), noise_scale)

@@ -178,13 +178,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
 
 
 def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarray) -> list[Cell]:
-    """Where and when it is tested, but for cells most of whose errors the modes take up.
-
-    Args:
-      trials: what was fitted.
-      labels: of each clip, the phases `[object, frame]`.
-      scales: `[clip]`, of its noise.
-    """
+    """Where and when it is tested, but for cells most of whose errors the modes take up."""
     found = list[Cell]()
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
         seen = problem.observation
@@ -203,12 +197,7 @@ def _at_own_scale(
 ) -> np.ndarray:
     """Tracking errors `[point, value]` in units of their fitted size, within bounds.
 
-    Args:
-      white: `[point, value]`, residuals whitened at `scale`.
-      scale: a noise scale.
-      used: numbers' worth of the clip that the parameters were fitted with.
-      bounds: of the fitted scale.
-      data: the clip's covariance, decomposed.
+    They were whitened at `scale`; `used` numbers' worth of the clip went into the parameters.
     """
     before = np.full(len(white), scale)
     after = fitted_noise_scale(white, before, np.full(len(white), used), NOISE_SD, data)

@@ -56,12 +56,7 @@ class Consensus:
 
 
 def consensus(values: np.ndarray, sds: np.ndarray) -> Consensus:
-    """The consensus of groups, at least `FEWEST`, that measured one quantity.
-
-    Args:
-      values: `[group]`, y.
-      sds: `[group]`, s > 0, in the same unit.
-    """
+    """The consensus of groups, at least `FEWEST`, that measured one quantity."""
     is_member = _start(values, sds)
     seen: set[bytes] = set()
     while True:

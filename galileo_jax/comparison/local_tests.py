@@ -48,12 +48,7 @@ def find_cells(
 ) -> list[Cell]:
     """The cells of one clip with enough frames.
 
-    Args:
-      clip: its index.
-      names: of the objects.
-      mask: `[object, frame]`, where the object was seen.
-      labels: `[object, frame]`, indices into `PHASES`.
-      axes: of the track.
+    `mask` and `labels` (indices into `PHASES`) are `[object, frame]`.
     """
     frames = mask.shape[1]
     found = []

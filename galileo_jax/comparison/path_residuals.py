@@ -128,11 +128,7 @@ def failing_interval(
 ) -> tuple[float, float] | None:
     """When the residuals of a cell deviate most, to one side: the window of largest |sum| / sqrt n.
 
-    Args:
-      white: `[2, frame]`, NaN where nothing was tracked.
-      labels: `[frame]`, indices into `PHASES`.
-      times_s: `[frame]`.
-      worst: the cell.
+    `white` is `[2, frame]`, NaN where nothing was tracked; `labels` are indices into `PHASES`.
     """
     values = white[AXES.index(worst.axis) if worst.axis in AXES else 2]
     if worst.phase != WHOLE:

@@ -16,7 +16,7 @@ PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fal
 FREE = {"spring": "swing", "pendulum": "swing", "liquid": "liquid"}  # by the law that makes it
 PHASES += ("flight", "swing", "liquid")
 COLLISION_S = 0.05  # either side of the hit
-RESTS_M_S = 2e-3
+RESTS_M_S, TOUCHES_M = 2e-3, 1e-4
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,7 @@ class Phase:
 def phases_of(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
     """The phases of one object, one after the other.
 
-    Args:
-      labels: `[frame]`, indices into `PHASES`.
-      times_s: `[frame]`.
+    `labels` `[frame]` are indices into `PHASES`.
     """
     borders = [0, *map(int, np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
     return tuple(
@@ -50,10 +48,6 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     the first hit; after it; at rest: where nothing moves any more, or not yet; fall, flight,
     swing, liquid: without anything to slide on.
 
-    Args:
-      problem: the clip and its model.
-      theta: `[model parameter]`, in their units.
-
     Returns:
       `[object, frame]`, indices into `PHASES`.
     """
@@ -66,10 +60,7 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     position, velocity = (a[0] for a in problem.engine.simulate(theta[None]))
     recorded = np.arange(position.shape[-1]) * model.record_dt_s
     label = np.empty((len(scene.names), len(times)), int)
-    if scene.is_level:
-        hit_s = _level_hit_s(position, recorded, scene)
-    else:
-        hit_s = _hit_s(position, recorded, scene.half_length_m)
+    hit_s = _hit_s(position, recorded, scene)
     for i in range(len(scene.names)):
         x = np.interp(times, recorded, position[i, 0])
         speed = np.interp(times, recorded, np.linalg.norm(velocity[i], axis=0))
@@ -84,9 +75,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
         if scene.is_level:
             label[i] = PHASES.index("table")
         label[i][speed < RESTS_M_S] = PHASES.index("at rest")
-        if (hit := hit_s[i]) is not None:
-            label[i][times > hit] = PHASES.index("after")
-            label[i][np.abs(times - hit) <= COLLISION_S] = PHASES.index("collision")
+        label[i][times > hit_s[i]] = PHASES.index("after")
+        label[i][np.abs(times - hit_s[i]) <= COLLISION_S] = PHASES.index("collision")
         label[i][times < 0 if scene.starts_moving else times <= 0] = PHASES.index("held")
     return label
 
@@ -97,41 +87,28 @@ def free_phase(scene: Surroundings) -> str:
     return next((phase for law, phase in FREE.items() if law in scene.laws), usual)
 
 
-def _hit_s(
-    position: np.ndarray, times_s: np.ndarray, half_length_m: tuple[float, ...]
-) -> list[float | None]:
-    """When each object first touches a neighbour; None where it does not."""
-    found: list[float | None] = [None] * len(position)
-    for i in range(len(position) - 1):
-        gap = position[i + 1, 0] - position[i, 0] - half_length_m[i] - half_length_m[i + 1]
-        touching = np.flatnonzero(gap < 1e-4)
-        if touching.size:
-            hit_s = float(times_s[touching[0]])
-            for j in (i, i + 1):
-                found[j] = min(hit_s, found[j] or hit_s)
-    return found
+def _hit_s(position: np.ndarray, times_s: np.ndarray, scene: Surroundings) -> list[float]:
+    """When each object first touches another, or a wall; infinite where it does not."""
+    found, half_m = [np.inf] * len(position), scene.half_length_m
 
+    def note(gap_m: np.ndarray, *who: int) -> None:
+        touching = np.flatnonzero(gap_m < TOUCHES_M)
+        for i in who if touching.size else ():
+            found[i] = min(found[i], float(times_s[touching[0]]))
 
-def _level_hit_s(
-    position: np.ndarray, times_s: np.ndarray, scene: Surroundings
-) -> list[float | None]:
-    """As `_hit_s`, of discs seen from above: any two may touch, or one a wall."""
-    found: list[float | None] = [None] * len(position)
-    radius_m = scene.half_length_m
+    if not scene.is_level:
+        for i, j in pairwise(range(len(position))):
+            note(position[j, 0] - position[i, 0] - half_m[i] - half_m[j], i, j)
+        return found
+
+    def nearest(apart_m: np.ndarray) -> np.ndarray:
+        """Between two records they come nearer than in either."""
+        return apart_m - np.abs(np.diff(apart_m, append=apart_m[-1:]))
+
     for i, j in combinations(range(len(position)), 2):
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
-        # Between two records they come nearer than in either.
-        step = np.abs(np.diff(apart, append=apart[-1:]))
-        touching = np.flatnonzero(apart - radius_m[i] - radius_m[j] < 1e-4 + step)
-        if touching.size:
-            hit_s = float(times_s[touching[0]])
-            for k in (i, j):
-                found[k] = min(hit_s, found[k] or hit_s)
+        note(nearest(apart) - half_m[i] - half_m[j], i, j)
     for i, ends in product(range(len(position)), scene.walls_m):
         away = distance_to_wall(np.moveaxis(position[i, :2], 0, -1), ends)
-        step = np.abs(np.diff(away, append=away[-1:]))
-        touching = np.flatnonzero(away - radius_m[i] < 1e-4 + step)
-        if touching.size:
-            hit_s = float(times_s[touching[0]])
-            found[i] = min(hit_s, found[i] or hit_s)
+        note(nearest(away) - half_m[i], i)
     return found

@@ -19,9 +19,7 @@ class Interval:
 def worst_interval(values: np.ndarray, times_s: np.ndarray) -> Interval | None:
     """The interval of largest |sum| / sqrt(number).
 
-    Args:
-      values: `[frame]`, N(0, 1) where the model is right; NaN is left out.
-      times_s: `[frame]`.
+    `values` `[frame]` are N(0, 1) where the model is right; NaN is left out.
 
     Returns:
       None with fewer than three values. White noise gives a z of about 3.0 for 120 values.

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.verdict import CONVINCING, DECISIVE
+from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import force_constants, is_any_weighed
@@ -38,11 +38,8 @@ def could_not_see(
 ) -> dict[str, dict[str, Any]]:
     """The smallest strength of each effect that the clips would have shown, beside a model.
 
-    Args:
-      trials: with the whole library.
-      last: the model, which describes the clips: else nobody knows their noise.
-      log_priors: of the effects of the library, over that of the model without effects.
-      seed: of the places and lengths at which effects that have them are tried.
+    `last` must describe the clips: else nobody knows their noise. `log_priors` are those of the
+    effects of the library, over that of the model without effects.
 
     Returns:
       effect to `strength` and `unit`, as diagnosis.json has them, the most probable beforehand

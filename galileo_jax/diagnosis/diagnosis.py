@@ -47,7 +47,7 @@ class Candidate:
       score_z: of the score test at zero strength, in standard deviations.
       log_evidence: over that of the model without effects: what the data say alone.
       log_prior: log of its probability before the data over that of the model without effects.
-      probability: among all candidates and the model without any of them.
+      probability: among all candidates and the model without any of them; 0 before it is ranked.
       p_value: of its adequacy; None where it was not compared (too improbable).
       confounded_with: candidates that these data do not tell from it.
       law: the formula, where it is a law that the missing force suggested; else None.
@@ -62,10 +62,10 @@ class Candidate:
     score_z: float
     log_evidence: float
     log_prior: float
-    probability: float
-    p_value: float | None
-    confounded_with: tuple[str, ...]
-    law: "Law | None" = None
+    probability: float = 0.0
+    p_value: float | None = None
+    confounded_with: tuple[str, ...] = ()
+    law: Law | None = None
     num_constants: int = 1
     num_expected: int = 0
     unusual: tuple[str, ...] = ()

@@ -36,13 +36,7 @@ NO_FORMULA = "no formula explains it"
 
 
 def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
-    """The contract's dictionary.
-
-    Args:
-      trials: those diagnosed, with the whole library.
-      diagnosis: what was found.
-      seed: of the posteriors' draws.
-    """
+    """The contract's dictionary."""
     named = trials.problems[0].observation.names
     rounds = [(one, _with_forces(trials, one.hypothesis, seed)) for one in diagnosis.rounds]
     added = {one.hypothesis.effects: entries for one, entries in rounds}

@@ -1,4 +1,4 @@
-"""For clips that no common model explains: compares each with the common model and its own fit.
+"""Each of several clips: against the model of all, by itself, and as the others predict it.
 
 Against the model of all, a clip's acceleration differs by a_j in each of NUM_PARTS equal parts of
 the way that object 1 goes in it; its start (the instant of the release) is its own:
@@ -15,12 +15,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+import jax.numpy as jnp
 import numpy as np
 from scipy.special import chdtrc
 
 from galileo_jax.comparison.compare import ADEQUATE_P, JUDGED_SCALE_RANGE, Comparison
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.result import velocity_error
+from galileo_jax.model.parameters import Parameter
+from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_PARTS = 4  # quarters, as they are called
@@ -57,13 +61,7 @@ class EachClip:
 def each_clip(
     trials: JointProblem, fit: GradientFit, comparison: Comparison
 ) -> tuple[EachClip, ...]:
-    """Every clip against the model of all and by itself.
-
-    Args:
-      trials: several clips.
-      fit: of all together, without effects.
-      comparison: of that fit with the data.
-    """
+    """Every clip against the model of all and by itself."""
     return tuple(_one(trials, fit, comparison, clip) for clip in range(len(trials.problems)))
 
 
@@ -148,3 +146,40 @@ def _parts(
     alike = np.clip(np.sum(left[:, 1:] * left[:, :-1]) / np.sum(left**2), 0.0, MOST_ALIKE)
     widened = max(1.0, float(rest)) * (1 + alike) / (1 - alike)
     return edges, found[1:], np.sqrt(np.diagonal(inverse) * widened)[1:]
+
+
+def leave_one_out_rmse(trials: JointProblem, hypothesis: Hypothesis) -> tuple[float, ...]:
+    """Per clip, the rmse (m/s) of its velocities as the other clips predict them.
+
+    A hypothesis that only follows the noise fits every clip and predicts none. The parameters of
+    the objects are those that the others gave; what is the clip's own (its release, its start)
+    stays at its prior's middle.
+    """
+    own = hypothesis.of(trials)
+    return tuple(_left_out(own, hypothesis, clip) for clip in range(len(own.problems)))
+
+
+def _left_out(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> float:
+    problem = trials.problems[clip]
+    others = JointProblem(tuple(p for i, p in enumerate(trials.problems) if i != clip))
+    kept = [i for i in range(len(trials.problems)) if i != clip]
+    # Names count clips, so that they change where one is left out: places do not.
+    start = np.zeros(len(others.model_parameters))
+    for new, old in enumerate(kept):
+        start[others.columns[new]] = hypothesis.fit.z[trials.columns[old]]
+    free = others.free(hypothesis.effects)[: len(start)]
+    fit = GradientFitter(others).fit_from(start[None], free[None], np.zeros(1, int))[0]
+    shared = dict(zip(others.names, others.theta(fit.z, fit.free), strict=True))
+    theta = np.array([_value(p, shared, hypothesis.effects) for p in problem.parameters])
+    predicted = problem.simulate(theta)
+    return velocity_error([problem], [predicted])["rmse"]
+
+
+def _value(parameter: Parameter, shared: dict[str, float], effects: tuple[str, ...]) -> float:
+    """What the others say; else the prior's middle of an effect that is there; else nothing."""
+    is_own = parameter.role == "nuisance" or parameter.per_clip
+    if not is_own and parameter.name in shared:
+        return float(shared[parameter.name])
+    if parameter.per_clip and parameter.name in effects:
+        return float(parameter.prior.forward(jnp.asarray(0.0)))
+    return parameter.absent

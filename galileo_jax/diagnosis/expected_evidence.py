@@ -20,13 +20,7 @@ from galileo_jax.search.fit import refit
 def expected_leads(
     trials: JointProblem, candidate: Candidate, rivals: Sequence[Candidate]
 ) -> list[float]:
-    """For each rival, how many nats of log odds it is behind on average if the candidate is true.
-
-    Args:
-      trials: what all were fitted to.
-      candidate: taken as the truth, at its fitted strength.
-      rivals: fitted to the same trials.
-    """
+    """For each rival, by how many nats it is behind on average if the candidate is true."""
     if not rivals:
         return []
     turned = turned_round(candidate.hypothesis.of(trials), candidate.hypothesis.fit)

@@ -89,13 +89,7 @@ class FrictionAlongWay:
 
 
 def friction_along_way(trials: JointProblem, fit: GradientFit, clip: int = 0) -> FrictionAlongWay:
-    """The friction of one clip's bodies.
-
-    Args:
-      trials: fitted with a size of `friction_roughness`.
-      fit: of them.
-      clip: which of the trials.
-    """
+    """The friction of one clip's bodies."""
     problem, linear = trials.problems[clip], linear_clips(trials, fit)[clip]
     motion, sizes = problem.seen_motion.motion, fit.sizes
     assert motion is not None and sizes is not None

@@ -11,17 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, compare
-from galileo_jax.diagnosis.diagnosis import Candidate, Round
+from galileo_jax.diagnosis.candidates import error_left
+from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
-from galileo_jax.diagnosis.stakes import odds_of
-from galileo_jax.diagnosis.verdict import (
-    CONVINCING,
-    explains,
-    num_expected,
-    ranked,
-    rivals,
-    to_compare,
-)
+from galileo_jax.diagnosis.judge import Judge
+from galileo_jax.diagnosis.law_verdict import joined_names, law_verdict
+from galileo_jax.diagnosis.stakes import num_expected, odds_of
+from galileo_jax.diagnosis.thresholds import CONVINCING
+from galileo_jax.diagnosis.verdict import explains, ranked, without_a_name
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
@@ -41,14 +38,14 @@ class ImperfectWorld:
       base: without effects.
       comparison: of it with the data.
       table: ranked; evidence is over that of `base`.
-      decisive: nats by which one must be ahead of another.
+      judge: of this world.
       friction: of each clip, where friction varies by more than is usual; else empty.
     """
 
     base: Hypothesis
     comparison: Comparison
     table: tuple[Candidate, ...]
-    decisive: float
+    judge: Judge
     friction: tuple[FrictionAlongWay, ...] = ()
 
     @property
@@ -65,34 +62,28 @@ class ImperfectWorld:
         error = error_of(trials, theta, fit.num_fitted, fit.pull, is_usual=False)
         return Round(self.base, replace(self.comparison, error=error), called=effects)
 
-    def with_candidates(
-        self, trials: JointProblem, candidates: Sequence[Candidate], seed: int
-    ) -> "ImperfectWorld":
-        """The same with the best of more candidates in its table.
-
-        Args:
-          trials: what was diagnosed.
-          candidates: ranked, of the exact world.
-          seed: of the replicates.
-        """
+    def with_candidates(self, candidates: Sequence[Candidate]) -> "ImperfectWorld":
+        """The same with the best of more candidates, ranked, of the exact world in its table."""
         known = {c.effects: c for c in self.table}
-        for candidate in _best(candidates):
-            if candidate.effects not in known:
-                sized = _sized(trials, self.base, candidate)
-                known |= {} if sized is None else {sized.effects: sized}
-        for c in to_compare(ranked(known.values()), self.decisive):
-            if c.p_value is None:
-                found = compare(c.hypothesis.of(trials), c.hypothesis.fit, seed)
-                known[c.effects] = replace(c, p_value=found.p_value)
-        done = ranked(known.values())
-        return replace(self, table=tuple(replace(c, confounded_with=rivals(c, done)) for c in done))
+        new = [c for c in _best(candidates) if c.effects not in known]
+        sized = [_sized(self.judge.trials, self.base, candidate) for candidate in new]
+        every = (*self.table, *(c for c in sized if c is not None))
+        return replace(self, table=self.judge.compared(every) if every else ())
+
+    def verdict(self) -> Verdict:
+        """The verdict on its table."""
+        is_friction = self.pushing is None
+        sure = without_a_name(self.comparison, self.table, is_friction)
+        sure = sure or law_verdict(self.table, self.judge.decisive)
+        if sure is not None:
+            return sure
+        found = self.judge.verdict(self.table)
+        is_law = {c.name for c in self.table if c.law is not None}
+        is_named = not is_law & set(joined_names(found))
+        return found if is_named else Verdict("unknown", (), reasons=found.reasons)
 
     def is_beaten_by(self, candidates: Sequence[Candidate]) -> bool:
-        """Whether an effect in an exact world is far more probable than none in this one.
-
-        Args:
-          candidates: of the exact world, compared with the data.
-        """
+        """Whether an effect in an exact world is far more probable than none in this one."""
         base = self.base.fit.log_evidence
         return any(
             explains(c) and c.hypothesis.fit.log_evidence + c.log_prior - base >= CONVINCING
@@ -111,17 +102,9 @@ class ImperfectWorld:
         return ranked((*self.table, *rest))
 
 
-def imperfect_world(
-    trials: JointProblem, base: Hypothesis, decisive: float, seed: int
-) -> ImperfectWorld | None:
-    """The model without effects in an imperfect world; None where nothing is imperfect there.
-
-    Args:
-      trials: what was diagnosed.
-      base: the exact model without effects.
-      decisive: nats by which one hypothesis must be ahead of another.
-      seed: of the replicates.
-    """
+def imperfect_world(judge: Judge, base: Hypothesis) -> ImperfectWorld | None:
+    """The model without effects in an imperfect world; None where nothing is imperfect there."""
+    trials = judge.trials
     world = with_imperfections(trials, base.fit, to_rest=False)
     if world.fit.sizes is None or world.fit.code is Code.FAILED:
         return None
@@ -130,8 +113,8 @@ def imperfect_world(
     if NAME in world.fit.sizes.unusual:
         every = range(len(trials.problems))
         friction = tuple(friction_along_way(world.trials, world.fit, clip) for clip in every)
-    comparison = compare(world.trials, world.fit, seed)
-    return ImperfectWorld(sized, comparison, (), decisive, friction)
+    comparison = compare(world.trials, world.fit, judge.seed)
+    return ImperfectWorld(sized, comparison, (), replace(judge, comparisons={}), friction)
 
 
 def _best(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -141,12 +124,7 @@ def _best(candidates: Sequence[Candidate]) -> list[Candidate]:
     named = [c for c in candidates if c.law is None and not c.is_form]
     pairs = [c for c in named if len(c.effects) > 1]
     single = [c for c in named if len(c.effects) == 1]
-    return [
-        *laws[:NUM_LAWS],
-        *forms[:NUM_FORMS],
-        *pairs[:NUM_PAIRS],
-        *single[:NUM_SINGLE],
-    ]
+    return [*laws[:NUM_LAWS], *forms[:NUM_FORMS], *pairs[:NUM_PAIRS], *single[:NUM_SINGLE]]
 
 
 def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Candidate | None:
@@ -156,7 +134,6 @@ def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Cand
     fit = world.fit
     if fit.sizes is None or fit.code is Code.FAILED:
         return None
-    theta = world.trials.theta(fit.z, fit.free)
     hypothesis = Hypothesis(candidate.effects, fit, world.trials)
     # What the clip leads to expect depends on the strength, which is another beside imperfections.
     before, now = odds_of(own, candidate.hypothesis), odds_of(world.trials, hypothesis)
@@ -165,7 +142,7 @@ def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Cand
         hypothesis=hypothesis,
         log_prior=candidate.log_prior + float(np.sum(np.log(now)) - np.sum(np.log(before))),
         num_expected=num_expected(now),
-        error=error_of(world.trials, theta, fit.num_fitted, fit.pull),
+        error=error_left(world.trials, fit),
         log_evidence=fit.log_evidence - base.fit.log_evidence,
         p_value=None,
         confounded_with=(),

@@ -1,6 +1,7 @@
 """The rules by which a formula becomes a law, or contests what a verdict is about.
 
-As those of `verdict`, they need no trials and no fit.
+As those of `verdict`, they need no trials and no fit; arguments are as there, formulas among the
+candidates where nothing else is said.
 """
 
 from collections.abc import Iterable, Sequence
@@ -8,15 +9,9 @@ from dataclasses import replace
 
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
-from galileo_jax.diagnosis.verdict import best_named, explains, verdict_of
-
-# Against an effect of the library. There are some sixty formulas of one factor: all together come
-# to as much as the library.
-FORMULA_ODDS = 0.25
-# A formula of two factors is a tenth as probable as one of one factor.
-LENGTH_ODDS = 0.1
-# An effect of so many constants (how strong, where, how wide) can imitate many motions.
-MANY_CONSTANTS = 3
+from galileo_jax.diagnosis.reasons import because
+from galileo_jax.diagnosis.thresholds import FORMULA_ODDS, LENGTH_ODDS, MANY_CONSTANTS
+from galileo_jax.diagnosis.verdict import best_named, contradicted, explains, verdict_of
 
 
 def law_odds(num_factors: int) -> float:
@@ -49,7 +44,7 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
     One effect is ambiguous then, with the formula; two at once, or one that is far behind the
     formula, are not worth naming. All else stays.
     """
-    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    law = _best_law(candidates)
     own = next((c for c in candidates if c.name in joined_names(verdict)), None)
     if law is None or own is None or own.log_odds - law.log_odds >= decisive:
         return verdict
@@ -62,22 +57,19 @@ def best_formula(candidates: Sequence[Candidate]) -> Candidate | None:
     """The most probable formula of those that explain the data; if none does, of all.
 
     None where the missing force suggested none.
-
-    Args:
-      candidates: ranked.
     """
-    laws = [c for c in candidates if c.law is not None]
-    return next((c for c in laws if explains(c)), laws[0] if laws else None)
+    return _best_law(candidates) or next((c for c in candidates if c.law is not None), None)
+
+
+def _best_law(candidates: Sequence[Candidate]) -> Candidate | None:
+    """The most probable formula that explains the data."""
+    return next((c for c in candidates if c.law is not None and explains(c)), None)
 
 
 def proposed_formula(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | None:
     """The formula that is worth trying as an effect: the law, one beside others, or the best.
 
     Where the verdict is unknown, the most probable of those that explain the data, if one does.
-
-    Args:
-      verdict: on them.
-      candidates: ranked.
     """
     if verdict.law is not None:
         return next(c for c in candidates if c.law == verdict.law)
@@ -89,11 +81,8 @@ def law_to_doubt(candidates: Sequence[Candidate]) -> Candidate | None:
     """The best formula that explains the data where no single effect of the library does better.
 
     An effect of the library may say the same, and its fit have missed it.
-
-    Args:
-      candidates: ranked, formulas among them.
     """
-    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    law = _best_law(candidates)
     first = best_named([c for c in candidates if len(c.effects) == 1])
     is_behind = law is not None and (not explains(first) or first.log_odds < law.log_odds)
     return law if is_behind else None
@@ -106,12 +95,6 @@ def is_law_needed(
 
     It does not where one effect with few constants explains the data and is not far behind: no
     formula would have been tried then.
-
-    Args:
-      verdict: of those fits.
-      candidates: of that verdict: ranked, without formulas.
-      law: that explains the data.
-      decisive: nats.
     """
     if needs_laws(verdict, candidates):
         return True
@@ -142,12 +125,8 @@ def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | N
 
     It must do what a hypothesis that is named must, in a table without forms and laws of the same
     formula: whether it pushes or changes friction may not be told.
-
-    Args:
-      candidates: as of `verdict_of`, laws among them.
-      decisive: difference in log odds, nats, at which one hypothesis rules out another.
     """
-    best = next((c for c in candidates if c.law is not None and explains(c)), None)
+    best = _best_law(candidates)
     if best is None:
         return None
     found = verdict_of(other_formulas(best, candidates), decisive)
@@ -157,22 +136,17 @@ def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | N
 
 
 def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Reason, ...]:
-    """Why there is no law, where formulas were fitted.
-
-    Args:
-      candidates: as of `law_verdict`, which found none.
-      decisive: nats.
-    """
+    """Why there is no law, where formulas were fitted."""
     best = best_formula(candidates)
     if best is None:
-        return (reasons.no_formula(),)
+        return (because("no_formula"),)
     if not explains(best):
-        return (reasons.no_law_explains(best),)
+        return (because("no_law_explains", best),)
     others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
     ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
     alike = [c for c in ahead if explains(c)]
     if not ahead:  # no other alone, but all together
         return verdict_of((best, *others), decisive).reasons[1:]
     if not alike:
-        return (reasons.better_but_contradicted(ahead[0], best),)
+        return (contradicted(ahead[0], best),)
     return tuple(reasons.contested(best, c, decisive) for c in alike[:1])

@@ -14,11 +14,6 @@ from galileo_jax.inference.joint_problem import JointProblem
 def fit_among(fit: GradientFit, own: JointProblem, other: JointProblem) -> GradientFit:
     """The same fit in the parameters of other effects, of which those that it has not are pinned.
 
-    Args:
-      fit: of `own`.
-      own: trials.
-      other: of the same clips.
-
     Raises:
       ValueError: the fit has a parameter that `other` has not.
     """

@@ -1,19 +1,29 @@
-"""What hangs on a hypothesis of a diagnosis: see `galileo_jax.search.table.Stakes`."""
+"""What hangs on a hypothesis of a diagnosis, and what each is worth before the data.
 
+As the rules of `verdict`, most of these need no fit.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb, log
 
 import numpy as np
 
-from galileo_jax.diagnosis.verdict import (
-    decisive_margin,
-    log_prior,
-    may_decide,
-    num_expected,
+from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.thresholds import (
+    CONVINCING,
+    DECISIVE,
+    EXPECTED_ODDS,
+    FAINT_FACTOR,
+    ROUGH_NATS,
+    SECOND_EFFECT_ODDS,
 )
+from galileo_jax.diagnosis.verdict import farthest
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.loop import MAY_STILL_GAIN
 from galileo_jax.search.table import Stakes
 
 
@@ -29,11 +39,6 @@ class VerdictStakes(Stakes):
     trials: JointProblem
     is_adequate: bool
 
-    @property
-    def decisive(self) -> float:
-        """Nats by which one hypothesis must be ahead of another."""
-        return decisive_margin(self.is_adequate)
-
     def log_prior(self, hypothesis: Hypothesis) -> float:
         """Log of its probability before the data over that of the model without effects."""
         library = [name for name in self.trials.all_effects if name not in FORM_NAMES]
@@ -42,8 +47,61 @@ class VerdictStakes(Stakes):
     def may_decide(
         self, log_odds: np.ndarray, is_form: np.ndarray, num_effects: np.ndarray
     ) -> np.ndarray:
-        """See `verdict.may_decide`."""
-        return may_decide(log_odds, is_form, num_effects, self.decisive, self.is_adequate)
+        """On which hypotheses, `[hypothesis]`, the verdict may hang: these are searched with care.
+
+        Each may still gain `MAY_STILL_GAIN` nats by that. Where the model without effects will do
+        and no named effect can come to convince, on none. One with more effects than the leading
+        one has paid for them: it is not behind by bad luck.
+
+        Arguments are `[hypothesis]`.
+        """
+        named = log_odds[~is_form].max(initial=-np.inf)
+        if self.is_adequate and named + MAY_STILL_GAIN < CONVINCING:
+            return np.zeros(len(log_odds), bool)
+        decisive, leader = decisive_margin(self.is_adequate), int(np.argmax(log_odds))
+        is_larger = num_effects > num_effects[leader]
+        behind = np.where(is_larger, decisive, farthest(decisive))
+        return log_odds > log_odds[leader] - behind - MAY_STILL_GAIN
+
+
+def decisive_margin(is_base_adequate: bool) -> float:
+    """The difference in log odds, nats, at which one hypothesis rules out another."""
+    return DECISIVE * (FAINT_FACTOR if is_base_adequate else 1.0)
+
+
+def log_prior(odds: Sequence[float], num_effects: int) -> float:
+    """Log of a hypothesis' probability before the data over that of the model without effects.
+
+    All single effects together are as probable as none, and all pairs `SECOND_EFFECT_ODDS` times
+    as probable; all of a kind share alike.
+
+    Args:
+      odds: of each of its effects, how many times as likely as others it is (`Effect.odds`).
+      num_effects: in the library, forms not counted.
+    """
+    share = SECOND_EFFECT_ODDS ** (len(odds) - 1) / comb(num_effects, len(odds))
+    return log(share) + float(np.sum(np.log(odds)))
+
+
+def num_expected(odds: Sequence[float]) -> int:
+    """How many effects of a hypothesis the clip leads to expect; `odds` as of `log_prior`."""
+    return sum(each > EXPECTED_ODDS for each in odds)
+
+
+def without_surplus(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates without those of more effects than the leading one that cannot contest it.
+
+    Beside every effect that explains the data stand its pairs with whatever does nothing here.
+    """
+    if not candidates:
+        return []
+    best = max(candidates, key=lambda c: c.log_odds)
+    return [
+        c
+        for c in candidates
+        if len(c.effects) <= max(len(best.effects), 1)
+        or best.log_odds - c.log_odds < DECISIVE + ROUGH_NATS
+    ]
 
 
 def odds_of(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
@@ -59,11 +117,6 @@ def num_constants(trials: JointProblem, hypothesis: Hypothesis) -> int:
     """Parameters of its effects, in one clip."""
     scene = trials.problems[0].model.scene.surroundings
     return sum(len(effect.parameters(scene)) for effect in _effects(trials, hypothesis))
-
-
-def expected_effects(trials: JointProblem, hypothesis: Hypothesis) -> int:
-    """How many of its effects the clip leads to expect."""
-    return num_expected(odds_of(trials, hypothesis))
 
 
 def _effects(trials: JointProblem, hypothesis: Hypothesis) -> list[Effect]:

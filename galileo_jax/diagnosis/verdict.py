@@ -3,73 +3,36 @@
 A hypothesis is judged by two numbers. Its log odds (log evidence by Laplace plus log prior, in
 nats, over the model without any effect) rank it among all others; the p-value of its comparison
 with the data says whether what it leaves unexplained is more than noise. The rules need no trials
-and no fit, so that each can be tested with candidates made by hand. Every threshold of the
-diagnosis stands here but those of formulas (`law_verdict`), and every rule says in the verdict's
-reasons why it fired.
+and no fit, so that each can be tested with candidates made by hand. Every rule says in the
+verdict's reasons why it fired; the numbers that decide are in `thresholds`.
+
+Candidates are `ranked`, those near the first compared with the data (`to_compare`); `decisive` is
+the difference in log odds, nats, at which one hypothesis rules out another.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import comb, log, sqrt
+from math import sqrt
 
 import numpy as np
 from scipy.special import softmax
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis import reasons
-from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
-from galileo_jax.search.loop import MAY_STILL_GAIN
+from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
+from galileo_jax.diagnosis.reasons import because
+from galileo_jax.diagnosis.thresholds import (
+    CONVINCING,
+    DECISIVE,
+    LEAST_GAIN,
+    MOST_LUCK,
+    PAIR_P,
+    SUBSTANTIAL,
+)
 
-# Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
-# twenty times less probable (e^3 = 20).
-DECISIVE = 3.0
-# Log evidence, in nats, by which the data themselves must speak for a name: with less, only what
-# was believed beforehand separates it from its rival (10^0.5 times: H. Jeffreys, Theory of
-# Probability, 3rd ed. 1961, app. B, 'substantial').
-SUBSTANTIAL = log(10) / 2
 # Imperfections that have the name of an effect where they are larger than usual.
 AS_EFFECTS: dict[tuple[str, ...], str] = {("friction_roughness",): "uneven_friction"}
 UNEVEN = tuple((name,) for name in AS_EFFECTS.values())
-# How much wider that margin is where the base model already passes its comparison: the effect is
-# then so faint that more hypotheses stay possible.
-FAINT_FACTOR = 2.0
-# Log odds, in nats, at which an effect is believed although the base model passes its comparison:
-# a test that looks everywhere notices less than one that knows where to look (e^7 = 1100).
-CONVINCING = 7.0
-# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion, and
-# one formula may be what they come close to. Where formulas were tried and all are far behind, a
-# pair needs no more than a single effect (`pair_ahead_of_all`): else one true pair of 25 would be
-# unknown. An effect that is so many times as likely as others, as the air's drag on a ball, does
-# not count.
-PAIR_P = 0.05
-EXPECTED_ODDS = 3.0
-# Two effects at once are so much rarer than one: who measures knows of most of what disturbs.
-SECOND_EFFECT_ODDS = 0.1
-# Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
-LEAST_GAIN = 10.0
-# The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
-# sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
-MOST_LUCK = 4.0
-ROUGH_NATS = 1.0  # by which log odds may be too low, where a hypothesis was refined roughly
-
-
-def log_prior(odds: Sequence[float], num_effects: int) -> float:
-    """Log of a hypothesis' probability before the data over that of the model without effects.
-
-    All single effects together are as probable as none, and all pairs `SECOND_EFFECT_ODDS` times
-    as probable; all of a kind share alike.
-
-    Args:
-      odds: of each of its effects, how many times as likely as others it is (`Effect.odds`).
-      num_effects: in the library, forms not counted.
-    """
-    share = SECOND_EFFECT_ODDS ** (len(odds) - 1) / comb(num_effects, len(odds))
-    return log(share) + float(np.sum(np.log(odds)))
-
-
-def num_expected(odds: Sequence[float]) -> int:
-    """How many effects of a hypothesis the clip leads to expect; `odds` as of `log_prior`."""
-    return sum(each > EXPECTED_ODDS for each in odds)
 
 
 def ranked(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
@@ -82,18 +45,8 @@ def ranked(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
     return tuple(replace(c, probability=float(p)) for c, p in zip(best_first, shares, strict=True))
 
 
-def decisive_margin(is_base_adequate: bool) -> float:
-    """The difference in log odds, nats, at which one hypothesis rules out another."""
-    return DECISIVE * (FAINT_FACTOR if is_base_adequate else 1.0)
-
-
 def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) -> bool:
-    """Whether the verdict is none: the base model will do and no named effect convinces.
-
-    Args:
-      is_base_accepted: whether the model without effects leaves nothing but noise.
-      candidates: ranked; forms without a name do not count.
-    """
+    """Whether the verdict is none: the base model will do and no named effect convinces."""
     return is_base_accepted and best_named(candidates).log_odds < CONVINCING
 
 
@@ -129,8 +82,8 @@ def without_a_name(
     rivals = [c for c in explaining if not c.is_form and c.law is None and c.log_odds > -DECISIVE]
     if not rivals:
         return Verdict("named", (name,), reasons=why)
-    because = (reasons.explains(rivals[0]), *why)
-    return Verdict("ambiguous", (rivals[0].name, name), reasons=because)
+    because_of_both = (because("explains", rivals[0]), *why)
+    return Verdict("ambiguous", (rivals[0].name, name), reasons=because_of_both)
 
 
 def best_named(candidates: Sequence[Candidate]) -> Candidate:
@@ -145,10 +98,6 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     with the best, alone or together: all others together come to less than a twentieth of it; and
     what the data themselves hardly tell from it. Where the best is a form that says the same as the
     best formula, beyond it what could be confused with the formula.
-
-    Args:
-      candidates: ranked.
-      margin: difference in log odds, nats, at which one hypothesis rules out another.
     """
     best = candidates[0]
     law = next((c for c in candidates if c.law is not None), None)
@@ -166,12 +115,7 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
 
 
 def _in_sum(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """As few hypotheses as must be looked at, that the others together are given up.
-
-    Args:
-      best: the one that they may contest.
-      candidates: ranked.
-    """
+    """As few that may contest the best as must be looked at: the others together are given up."""
     others = _without(best, candidates)
     return [c for i, c in enumerate(others) if best.log_odds - _sum_of(others[i:]) < DECISIVE]
 
@@ -248,10 +192,6 @@ def pair_ahead_of_all(candidates: Sequence[Candidate], decisive: float) -> Candi
 
     All other hypotheses together, formulas and forms among them, are behind it by what a name
     needs, whether the data contradict them or not.
-
-    Args:
-      candidates: ranked.
-      decisive: nats by which it must be ahead.
     """
     best = candidates[0]
     is_pair = len(best.effects) > 1 and not best.is_form
@@ -269,20 +209,12 @@ def form_that_leads(singles: Sequence[Candidate]) -> Candidate | None:
 
 
 def needs_pairs(singles: Sequence[Candidate]) -> bool:
-    """Whether pairs are to be tried: a single effect leaves more than noise, or a form leads.
-
-    Args:
-      singles: ranked, compared with the data.
-    """
+    """Whether pairs are to be tried: a single effect leaves more than noise, or a form leads."""
     return not explains(best_named(singles)) or form_that_leads(singles) is not None
 
 
 def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     """The verdict on the whole table, without advice.
-
-    Args:
-      candidates: ranked; those compared have a p-value, and the first is among them.
-      decisive: difference in log odds, nats, at which one hypothesis rules out another.
 
     Returns:
       Named: one hypothesis explains the data, and nothing else does about as well, nor all others
@@ -292,41 +224,64 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     """
     best, explaining = candidates[0], _explaining(candidates)
     if not explaining:
-        return Verdict("unknown", (), reasons=(reasons.nothing_explains(best),))
+        return _unknown(because("nothing_explains", best))
     top = explaining[0]
     if best.log_odds - top.log_odds >= decisive:
-        return Verdict("unknown", (), reasons=(reasons.better_but_contradicted(best, top),))
+        return _unknown(contradicted(best, top))
     if top.log_odds < 0:
-        return Verdict("unknown", (), reasons=(reasons.less_probable_than_none(top),))
+        return _unknown(because("less_probable_than_none", top, log_odds=top.log_odds))
     equal = [c for c in explaining if top.log_odds - c.log_odds < decisive]
     names, forms = [c for c in equal if not c.is_form], [c for c in equal if c.is_form]
     if not names:
         name = next((c for c in explaining if not c.is_form), None)
-        return Verdict("unknown", (), forms[0].name, reasons=(reasons.only_a_form(top, name),))
-    why = reasons.explains(names[0])
+        only = because("only_a_form", top, p_value=top.p_value)
+        return _unknown(because("only_a_form:name", top, name) if name else only, forms[0].name)
+    why = because("explains", names[0])
     possible = [c for c in candidates if c.p_value is None or c in explaining]
-    together = [c for c in _in_sum(top, possible) if c in explaining and len(equal) == 1]
-    if together:
-        ahead = top.log_odds - _sum_of(_without(top, possible))
-        because = [reasons.contested_together(top, together, ahead, DECISIVE)]
-        alike = _with_rivals(top, together)
-        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *because))
-    same = [c for c in _same_by_data(top, possible) if c in explaining and len(equal) == 1]
-    if same:
-        alike = _with_rivals(top, same)
-        because = [reasons.separated_by_prior(top, each, SUBSTANTIAL) for each in alike[1:]]
-        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *because))
     if len(equal) == 1:
-        out = [reasons.out_of_the_race(best, top, _least_p(best))] if best is not top else []
+        if together := [c for c in _in_sum(top, possible) if c in explaining]:
+            numbers = {
+                "log_odds_behind": top.log_odds - _sum_of(_without(top, possible)),
+                "least_log_odds": DECISIVE,
+            }
+            words = {"others": ", ".join(c.title for c in together)}
+            because_all = because("contested_together", top, together[0], words, **numbers)
+            return _ambiguous(_with_rivals(top, together), why, because_all)
+        if same := [c for c in _same_by_data(top, possible) if c in explaining]:
+            alike, least = _with_rivals(top, same), {"least_log_evidence": SUBSTANTIAL}
+            by_prior = (because("separated_by_prior", top, c, **least) for c in alike[1:])
+            return _ambiguous(alike, why, *by_prior)
         behind = [c for c in candidates if c in possible or top.log_odds - c.log_odds >= decisive]
-        others = [c for c in behind if c.effects != top.effects]
-        lead = reasons.decisive(top, others, decisive)
-        return Verdict("named", top.effects, reasons=(why, *out, lead))
+        lead = reasons.decisive(top, behind, decisive)
+        return Verdict("named", top.effects, reasons=(why, *_out_of_the_race(best, top), lead))
     alike = [*_without_more(names), *forms[:1]]
     if len(alike) == 1:
         alike = names
     contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
-    return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
+    return _ambiguous(alike, why, *contests)
+
+
+def _unknown(why: Reason, form: str | None = None) -> Verdict:
+    return Verdict("unknown", (), form, reasons=(why,))
+
+
+def _ambiguous(alike: Sequence[Candidate], *why: Reason) -> Verdict:
+    return Verdict("ambiguous", tuple(c.name for c in alike), reasons=why)
+
+
+def contradicted(better: Candidate, best: Candidate) -> Reason:
+    """That what the data contradict is far more probable than the best that explains them."""
+    ahead = better.log_odds - best.log_odds
+    numbers = {"log_odds_behind": ahead, "p_value": better.p_value}
+    return because("better_but_contradicted", best, better, **numbers)
+
+
+def _out_of_the_race(better: Candidate, best: Candidate) -> tuple[Reason, ...]:
+    """That what the data contradict is a little more probable; empty where it is the best."""
+    if better is best:
+        return ()
+    numbers = {"p_value": better.p_value, "least_p_value": _least_p(better)}
+    return (because("out_of_the_race", best, better, **numbers),)
 
 
 def _with_rivals(top: Candidate, rivals: Sequence[Candidate]) -> list[Candidate]:
@@ -358,69 +313,19 @@ def within_luck(
 
     Luck is this clip's noise: with another, a rival that the data do not contradict and that is
     not too far behind might be as good. Which these are depends on the clip, not on a list.
-
-    Args:
-      named: the only one that explains the data.
-      candidates: ranked.
-      decisive: nats by which a rival must be behind.
     """
     return [
         c
         for c in candidates
         if c.effects != named.effects
         and (c.p_value is None or explains(c))
-        and named.log_odds - c.log_odds < _farthest(decisive)
+        and named.log_odds - c.log_odds < farthest(decisive)
     ]
 
 
-def _farthest(decisive: float) -> float:
+def farthest(decisive: float) -> float:
     """How far behind, in nats, a hypothesis may be only by bad luck."""
     return decisive + MOST_LUCK * sqrt(2 * decisive)
-
-
-def may_decide(
-    log_odds: np.ndarray,
-    is_form: np.ndarray,
-    num_effects: np.ndarray,
-    decisive: float,
-    is_base_adequate: bool,
-) -> np.ndarray:
-    """On which hypotheses, `[hypothesis]`, the verdict may hang: these are searched with care.
-
-    Each may still gain `MAY_STILL_GAIN` nats by that. Where the model without effects will do and
-    no named effect can come to convince, on none. One with more effects than the leading one has
-    paid for them: it is not behind by bad luck.
-
-    Args:
-      log_odds: `[hypothesis]`, so far.
-      is_form: `[hypothesis]`, whether it is a form without a name.
-      num_effects: `[hypothesis]`.
-      decisive: nats by which a rival must be behind.
-      is_base_adequate: whether the model without effects leaves nothing but noise.
-    """
-    named = log_odds[~is_form].max(initial=-np.inf)
-    if is_base_adequate and named + MAY_STILL_GAIN < CONVINCING:
-        return np.zeros(len(log_odds), bool)
-    leader = int(np.argmax(log_odds))
-    is_larger = num_effects > num_effects[leader]
-    farthest = np.where(is_larger, decisive, _farthest(decisive))
-    return log_odds > log_odds[leader] - farthest - MAY_STILL_GAIN
-
-
-def without_surplus(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates without those of more effects than the leading one that cannot contest it.
-
-    Beside every effect that explains the data stand its pairs with whatever does nothing here.
-    """
-    if not candidates:
-        return []
-    best = max(candidates, key=lambda c: c.log_odds)
-    return [
-        c
-        for c in candidates
-        if len(c.effects) <= max(len(best.effects), 1)
-        or best.log_odds - c.log_odds < DECISIVE + ROUGH_NATS
-    ]
 
 
 def looked_at_again(
@@ -440,12 +345,12 @@ def looked_at_again(
     """
     looks = tuple(reasons.told_apart(named, rival, by, decisive) for rival, by in expected)
     alike = [rival for rival, by in expected if by < decisive]
-    because = (*verdict.reasons, *looks)
+    why = (*verdict.reasons, *looks)
     if not alike:
-        return replace(verdict, reasons=because)
+        return replace(verdict, reasons=why)
     names = [c.name for c in alike if not c.is_form]
     forms = [c.name for c in alike if c.is_form]
-    return Verdict("ambiguous", (named.name, *names, *forms[:1]), reasons=because)
+    return Verdict("ambiguous", (named.name, *names, *forms[:1]), reasons=why)
 
 
 def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | None:
@@ -453,10 +358,7 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
 
     The one that is named; of several that explain the data as well, the first. Where the verdict
     is unknown, the best named effect is shown if it helps, though it does not explain the data.
-
-    Args:
-      verdict: any; nothing is added where it is none or an imperfection.
-      candidates: ranked.
+    Nothing is added where it is none or an imperfection.
     """
     if verdict.status == "none" or verdict.effects in UNEVEN:
         return None

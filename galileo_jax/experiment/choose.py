@@ -56,14 +56,8 @@ def expect(
 ) -> list[Expected]:
     """What is expected of every setting, in their order.
 
-    Args:
-      clip: of the first of the trials.
-      trials: the clips that there are, whose models have all effects.
-      beliefs: the hypotheses that are still possible.
-      settings: to be looked at.
-      about: a parameter, or mass_ratio; None: which hypothesis holds.
-      seed: of all draws.
-      seconds: length of the new clip; None: long enough for most.
+    About the parameter `about` (or mass_ratio), or which hypothesis holds, from a clip of so many
+    `seconds` (None: long enough for most).
 
     Raises:
       InputError: a setting has no place in the scene, or no hypothesis has the parameter.

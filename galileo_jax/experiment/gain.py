@@ -46,11 +46,7 @@ def about_hypotheses(
 ) -> Gain:
     """The gain about which hypothesis holds.
 
-    Args:
-      rehearsed: every hypothesis at the setting.
-      log_odds: `[hypothesis]`, before the experiment.
-      margin: nats by which all others must be behind.
-      seed: of the noise.
+    `log_odds` `[hypothesis]` are those before it; all others must be behind by `margin` nats.
     """
     log_prior = log_softmax(log_odds)
     generator = np.random.default_rng([seed, 71])
@@ -71,9 +67,7 @@ def about_hypotheses(
 def about_parameter(one: Rehearsed, weights: np.ndarray) -> float:
     """The gain about a parameter if a hypothesis holds, nats.
 
-    Args:
-      one: the hypothesis.
-      weights: `[parameter]`, the combination of the trials' parameters, in z.
+    `weights` `[parameter]` combine the trials' parameters, in z.
     """
     along = weights @ one.root
     before = float(along @ along)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import softmax
 
 from galileo_jax.diagnosis.diagnosis import Diagnosis
-from galileo_jax.diagnosis.verdict import decisive_margin
+from galileo_jax.diagnosis.stakes import decisive_margin
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
@@ -101,9 +101,7 @@ def write_beliefs(path: Path, trials: JointProblem, beliefs: Beliefs) -> None:
 def read_beliefs(path: Path, parameters: Sequence[str]) -> Beliefs:
     """Reads what `write_beliefs` wrote.
 
-    Args:
-      path: of the file.
-      parameters: names that it must have, in their order.
+    It must have these `parameters`, in their order.
 
     Raises:
       InputError: missing, damaged, or of another model.

@@ -32,12 +32,8 @@ def write_clip(
 ) -> Clip:
     """Writes a track and the yaml beside it.
 
-    Args:
-      path: of the csv.
-      text: that the lab answered.
-      declared: of a clip's yaml.
-      settings: of the experiment; angle and frame rate are declared, too.
-      others: the tracks before it by the number of their experiment, of which it may be none.
+    Angle and frame rate of the settings are declared, too. The track may be none of the `others`,
+    by the number of their experiment.
 
     Raises:
       LabError: it is no track, no clip, or the same as before; nothing is left of it then.

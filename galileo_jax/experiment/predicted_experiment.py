@@ -53,11 +53,7 @@ def rehearse(
 ) -> list[Rehearsed]:
     """Rolls out every hypothesis at a setting.
 
-    Args:
-      proposal: the experiment.
-      trials: what the beliefs are about.
-      beliefs: the hypotheses, the most probable first.
-      seed: of the draws; the same for all settings, so that they differ by nothing else.
+    Draws are the same for all settings, so that they differ by nothing else.
     """
     drawn = [_draws(proposal, trials, belief, seed) for belief in beliefs]
     problem = proposal.problem

@@ -49,12 +49,7 @@ def propose(
 ) -> Proposal:
     """The experiment with a setting.
 
-    Args:
-      clip: of the first of the trials.
-      trials: the clips that there are, whose models have all effects.
-      noise_scale: fitted, of the first.
-      setting: by name, with or without units.
-      seconds: length of the new clip; None: long enough for most.
+    `noise_scale` is that fitted of the first clip; `seconds` None: long enough for most.
 
     Raises:
       InputError: a setting has no place in the scene.

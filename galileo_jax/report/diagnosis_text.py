@@ -9,7 +9,8 @@ from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
-from galileo_jax.diagnosis.verdict import DECISIVE, UNEVEN
+from galileo_jax.diagnosis.thresholds import DECISIVE
+from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
 from galileo_jax.results.command_line import command_line

@@ -9,12 +9,6 @@ from galileo_jax.runtime.errors import InputError
 def check_known(option: str, noun: str, name: object, known: Collection[str]) -> None:
     """Does nothing where `name` is one of `known`.
 
-    Args:
-      option: that it was given to, as the command writes it (--scenario).
-      noun: what it names.
-      name: to be checked.
-      known: all that there are.
-
     Raises:
       InputError: it is none of them; one line with the nearest and with all of them.
     """

@@ -32,11 +32,7 @@ class Registry(Generic[Entry]):
     def __init__(self, singular: str, plural: str, *packages: str, entry_points: str | None = None):
         """A registry without entries.
 
-        Args:
-          singular: what one entry is called in messages.
-          plural: what several are called.
-          packages: each a package all of whose modules are imported, or a single module.
-          entry_points: a group of installed packages' entry points, which are loaded as well.
+        All modules of `packages` are imported, and a group of installed packages' entry points.
         """
         self.singular, self.plural = singular, plural
         self._packages = list(packages)

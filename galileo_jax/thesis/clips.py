@@ -22,11 +22,7 @@ def thesis_clips(
 ) -> Arrays:
     """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives.
 
-    Args:
-      key: of everything random.
-      count: how many samples.
-      noise_m: of every coordinate.
-      stated_noise_m: what the network is given for it; default: the truth.
+    The network is told of `stated_noise_m`, by default the truth.
 
     Returns:
       the samples, and with them `collides`: whether object 2 moves by more than 0.1 mm.
@@ -45,11 +41,8 @@ def thesis_clips(
 def to_clips(theta: np.ndarray, seen_m: np.ndarray, scene: Surroundings, noise_m: float) -> Arrays:
     """Samples of an ideal world, in the form `GalileoTask.make` gives.
 
-    Args:
-      theta: `[sample, 4]`, m1, k1, m2, k2.
-      seen_m: `[sample, object, 2, frame]`, centres at the thesis's frame rate.
-      scene: of all of them.
-      noise_m: what the network is told of the noise of every coordinate.
+    `theta` is `[sample, 4]` (m1, k1, m2, k2), `seen_m` `[sample, object, 2, frame]` at the thesis's
+    frame rate.
     """
     frames = seen_m.shape[-1]
     missing = ((0, 0), (0, 0), (0, 0), (0, NUM_FRAMES - frames))

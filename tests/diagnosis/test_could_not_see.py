@@ -12,7 +12,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.diagnosis.could_not_see import could_not_see, smallest_shown
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
-from galileo_jax.diagnosis.verdict import CONVINCING
+from galileo_jax.diagnosis.thresholds import CONVINCING
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import measure

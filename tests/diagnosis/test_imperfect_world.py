@@ -8,6 +8,7 @@ from galileo_jax.api.clips import load
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.imperfect_world import imperfect_world
+from galileo_jax.diagnosis.judge import Judge
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure
@@ -161,9 +162,9 @@ def test_an_effect_is_expected_at_its_strength_beside_imperfections(tmp_path):
     own = Hypothesis(("air_drag",), best_fit(fitter, 0, effects=("air_drag",)))
     prior = VerdictStakes(trials, False).log_prior(own)
     exact = Candidate(own.effects, own, {}, 0.0, own.evidence_over(base), prior, 0.5, None, ())
-    world = imperfect_world(trials, base, 3.0, 0)
+    world = imperfect_world(Judge(trials, 3.0, 0), base)
     assert world is not None
-    (found,) = world.with_candidates(trials, [exact], 0).table
+    (found,) = world.with_candidates([exact]).table
     stakes = VerdictStakes(found.hypothesis.of(trials), False)
     assert found.log_prior == pytest.approx(stakes.log_prior(found.hypothesis))
     assert abs(found.log_prior - exact.log_prior) > 0.1

@@ -4,23 +4,27 @@ Thresholds stand here as plain numbers, not imported: whoever changes one change
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
+from galileo_jax.diagnosis.stakes import (
+    VerdictStakes,
+    decisive_margin,
+    log_prior,
+    num_expected,
+    without_surplus,
+)
 from galileo_jax.diagnosis.verdict import (
     best_named,
-    decisive_margin,
     explains,
     form_that_leads,
     is_nothing_missing,
-    log_prior,
     looked_at_again,
-    may_decide,
     needs_pairs,
-    num_expected,
     pair_ahead_of_all,
     ranked,
     rivals,
@@ -29,7 +33,6 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     within_luck,
     without_a_name,
-    without_surplus,
 )
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -537,6 +540,11 @@ def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
     assert to_add(Verdict("unknown", ()), (form, replace(helps, log_evidence=10.0))) is None
 
 
+def may_decide(is_adequate: bool, *columns: np.ndarray) -> list[bool]:
+    nothing: Any = None  # of trials is asked
+    return VerdictStakes(nothing, is_adequate).may_decide(*columns).tolist()
+
+
 @pytest.mark.parametrize(
     ("log_odds", "is_adequate", "expected"),
     [
@@ -551,23 +559,20 @@ def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
     ],
 )
 def test_on_whom_the_verdict_may_hang(log_odds, is_adequate, expected):
-    margin = DECISIVE * (2 if is_adequate else 1)
-    is_form = np.zeros(len(log_odds), bool)
-    alone = np.ones(len(log_odds), int)
-    found = may_decide(np.array(log_odds), is_form, alone, margin, is_adequate)
-    assert found.tolist() == expected
+    is_form, alone = np.zeros(len(log_odds), bool), np.ones(len(log_odds), int)
+    assert may_decide(is_adequate, np.array(log_odds), is_form, alone) == expected
 
 
 def test_a_form_alone_convinces_nobody():
     is_form, alone = np.array([True, False]), np.array([1, 1])
-    assert not may_decide(np.array([30.0, 0.0]), is_form, alone, 6.0, True).any()
+    assert not any(may_decide(True, np.array([30.0, 0.0]), is_form, alone))
 
 
 def test_what_has_an_effect_more_than_the_leader_is_not_behind_by_bad_luck():
     """Eight nats: the margin of three, and five that another valley may bring."""
     log_odds, num_effects = np.array([50.0, 43.0, 41.0, 41.0]), np.array([1, 2, 2, 1])
-    found = may_decide(log_odds, np.zeros(4, bool), num_effects, 3.0, False)
-    assert found.tolist() == [True, True, False, True]
+    found = may_decide(False, log_odds, np.zeros(4, bool), num_effects)
+    assert found == [True, True, False, True]
 
 
 def test_a_pair_that_cannot_contest_the_leading_effect_is_left_out():

@@ -84,12 +84,8 @@ def fitted_laws(
     formula pushes or changes friction, one object or all, only a fit can tell: the best is tried
     in every way.
 
-    Args:
-      trials: what was diagnosed.
-      near: no effects, all else from where fits start.
-      views: of each clip, from `missing_force.views_of`.
-      wanted: what is tried whatever the screening says of them.
-      on_stage: told what is being done.
+    `near` has no effects, all else from where fits start; `wanted` is tried whatever the screening
+    says of it.
     """
     found = suggestions(views, wanted)
     on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
@@ -110,9 +106,6 @@ def without_twins(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
     count twice in a table of probabilities. The more evident is left, or else the shorter claim:
     motions that are alike may need stranger constants for it (on object 1 a power of 1.8 where one
     of 1.2 does on all).
-
-    Args:
-      laws: the most evident first.
     """
     motions = [_motion(law, laws[0]) for law in laws]
 

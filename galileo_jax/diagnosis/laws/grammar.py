@@ -76,13 +76,21 @@ TIMES_S = tuple(np.geomspace(0.05, 1.5, 12).tolist())
 PERIODS_S = tuple(np.geomspace(0.08, 1.5, 40).tolist())
 LENGTHS_M = tuple(np.geomspace(0.06, 1.0, 60).tolist())
 PHASES = tuple((np.arange(9) * np.pi / 8).tolist())  # half a turn: a strength has either sign
-WIDTHS_S = (0.02, 0.04, 0.08, 0.16)
-WIDTHS_M = (0.02, 0.04, 0.08, 0.16)
+WIDTHS = (0.02, 0.04, 0.08, 0.16)  # s and m
 RATES = (-10.0, -5.0, -2.5, -1.0, 1.0, 2.5, 5.0, 10.0)
+
+
+PHASE = Constant("1", Uniform(-4.0, 8.0), PHASES)
+RATE = Constant("1/m", Normal(0.0, 6.0), RATES)
+MOMENT, PLACE = (Constant(unit, None, 30) for unit in ("s", "m"))
 
 
 def _power(top: float = 3.0) -> Constant:
     return Constant("1", Uniform(0.0, top), POWERS)
+
+
+def _size(unit: str, median: float, grid: Sequence[float], sd: float = 0.7) -> Constant:
+    return Constant(unit, LogNormal(median, sd), grid)
 
 
 FACTORS = (
@@ -92,97 +100,65 @@ FACTORS = (
         "t",
         "xp.exp(-t / {tau})",
         "exp(-t/{tau})",
-        {"tau": Constant("s", LogNormal(0.3, 0.8), TIMES_S)},
+        {"tau": _size("s", 0.3, TIMES_S, sd=0.8)},
     ),
     Factor(
         "wave",
         "t",
         "xp.sin(6.283185307 * t / {period} + {phase})",
         "sin(2π t/{period} + {phase})",
-        {
-            "period": Constant("s", LogNormal(0.4, 0.7), PERIODS_S),
-            "phase": Constant("1", Uniform(-4.0, 8.0), PHASES),
-        },
+        {"period": _size("s", 0.4, PERIODS_S), "phase": PHASE},
     ),
     Factor(
         "pulse",
         "t",
         "xp.exp(-(((t - {moment}) / {width}) ** 2))",
         "exp(-((t - {moment})/{width})²)",
-        {
-            "moment": Constant("s", None, 30),
-            "width": Constant("s", LogNormal(0.07, 0.7), WIDTHS_S),
-        },
+        {"moment": MOMENT, "width": _size("s", 0.07, WIDTHS)},
     ),
     Factor(
         "step",
         "t",
         "0.5 * (1.0 + xp.tanh((t - {moment}) / {width}))",
         "step(t - {moment})",
-        {
-            "moment": Constant("s", None, 30),
-            "width": Constant("s", LogNormal(0.03, 0.7), (0.02, 0.05)),
-        },
+        {"moment": MOMENT, "width": _size("s", 0.03, (0.02, 0.05))},
     ),
-    Factor(
-        "growth",
-        "q",
-        "xp.exp({rate} * q)",
-        "exp({rate} q)",
-        {
-            "rate": Constant("1/m", Normal(0.0, 6.0), RATES),
-        },
-    ),
+    Factor("growth", "q", "xp.exp({rate} * q)", "exp({rate} q)", {"rate": RATE}),
     Factor("linear", "q", "q", "q", {}),
     Factor(
         "wave",
         "q",
         "xp.sin(6.283185307 * q / {length} + {phase})",
         "sin(2π q/{length} + {phase})",
-        {
-            "length": Constant("m", LogNormal(0.25, 0.7), LENGTHS_M),
-            "phase": Constant("1", Uniform(-4.0, 8.0), PHASES),
-        },
+        {"length": _size("m", 0.25, LENGTHS_M), "phase": PHASE},
     ),
     Factor(
         "pulse",
         "q",
         "xp.exp(-(((q - {place}) / {width}) ** 2))",
         "exp(-((q - {place})/{width})²)",
-        {
-            "place": Constant("m", None, 30),
-            "width": Constant("m", LogNormal(0.06, 0.7), WIDTHS_M),
-        },
+        {"place": PLACE, "width": _size("m", 0.06, WIDTHS)},
     ),
     Factor(
         "pull",
         "q",
         "-(q - {place}) / {width} / (1.0 + ((q - {place}) / {width}) ** 2) ** 2",
         "u/(1 + u²)², u = ({place} - q)/{width}",
-        {
-            "place": Constant("m", None, 30),
-            "width": Constant("m", LogNormal(0.05, 0.7), WIDTHS_M),
-        },
+        {"place": PLACE, "width": _size("m", 0.05, WIDTHS)},
     ),
     Factor(
         "slope",
         "q",
         "-(q - {place}) / {width} * xp.exp(-(((q - {place}) / {width}) ** 2))",
         "u exp(-u²), u = ({place} - q)/{width}",
-        {
-            "place": Constant("m", None, 30),
-            "width": Constant("m", LogNormal(0.05, 0.7), WIDTHS_M),
-        },
+        {"place": PLACE, "width": _size("m", 0.05, WIDTHS)},
     ),
     Factor(
         "far",
         "q",
         "1.0 / (1.0 + ((q - {place}) / {width}) ** 2)",
         "1/(1 + ((q - {place})/{width})²)",
-        {
-            "place": Constant("m", None, 30),
-            "width": Constant("m", LogNormal(0.1, 0.7), (*WIDTHS_M, 0.3)),
-        },
+        {"place": PLACE, "width": _size("m", 0.1, (*WIDTHS, 0.3))},
     ),
     Factor("power", "v", "(v * v + 1e-4) ** ({n} / 2)", "|v|^{n}", {"n": _power(3.5)}),
     Factor(
@@ -190,7 +166,7 @@ FACTORS = (
         "v",
         "xp.exp(-xp.abs(v) / {speed})",
         "exp(-|v|/{speed})",
-        {"speed": Constant("m/s", LogNormal(0.3, 0.8), (0.1, 0.2, 0.4, 0.8))},
+        {"speed": _size("m/s", 0.3, (0.1, 0.2, 0.4, 0.8), sd=0.8)},
     ),
     Factor("backward", "v", "xp.where(v < 0, 1.0, 0.0 * v)", "(v < 0)", {}),
 )
@@ -220,36 +196,38 @@ class Structure:
         return "*".join(sorted(factor.kind for factor in self.factors))
 
     @property
-    def constants(self) -> dict[str, tuple[Factor, Constant]]:
-        """By name, those of a second factor of the same name with a 2."""
-        found: dict[str, tuple[Factor, Constant]] = {}
+    def own_names(self) -> list[dict[str, str]]:
+        """By factor its constants' names in the formula, where a second of a name has a 2."""
+        found: list[dict[str, str]] = []
         for factor in self.factors:
-            for name, constant in factor.constants.items():
-                found[name if name not in found else f"{name}2"] = factor, constant
+            used = [name for own in found for name in own]
+            found.append({name: f"{name}2" if name in used else name for name in factor.constants})
         return found
 
-    def _filled(self, attribute: str, values: Mapping[str, str]) -> list[str]:
-        used: set[str] = set()
-        parts = []
-        for factor in self.factors:
-            own = {}
-            for name in factor.constants:
-                mine = name if name not in used else f"{name}2"
-                used.add(mine)
-                own[name] = values[mine]
-            parts.append(getattr(factor, attribute).format(**own))
-        return parts
+    @property
+    def constants(self) -> dict[str, tuple[Factor, Constant]]:
+        """By name in the formula."""
+        return {
+            own: (factor, factor.constants[name])
+            for factor, names in zip(self.factors, self.own_names, strict=True)
+            for name, own in names.items()
+        }
 
     @property
     def code(self) -> str:
         """F as Python, of t, q, v, xp and the constants."""
-        parts = self._filled("code", {name: name for name in self.constants})
+        own = zip(self.factors, self.own_names, strict=True)
+        parts = [factor.code.format(**names) for factor, names in own]
         return parts[0] if len(parts) == 1 else " * ".join(f"({part})" for part in parts)
 
     def text(self, values: Mapping[str, float] | None = None) -> str:
         """As a physicist writes it, constants by value or by name."""
         names = {name: name if values is None else f"{values[name]:.3g}" for name in self.constants}
-        shape = " ".join(self._filled("text", names)).replace("- -", "+ ")
+        parts = [
+            factor.text.format(**{name: names[own] for name, own in mine.items()})
+            for factor, mine in zip(self.factors, self.own_names, strict=True)
+        ]
+        shape = " ".join(parts).replace("- -", "+ ")
         whom = "all objects" if self.is_on_all else "object 1"
         head = {
             "push": f"a = c {shape}",
@@ -307,23 +285,19 @@ def without_one_factor(
 ) -> list[tuple[Structure, dict[str, float], float]]:
     """What a formula of two factors is without either of them: one may do nothing.
 
-    Args:
-      structure: of one factor or two.
-      values: of its constants, and its strength as `c`.
+    `values` are those of its constants, and its strength as `c`.
 
     Returns:
       The simpler formulas, each with its constants and strength.
     """
     found = []
-    for factor in structure.factors if len(structure.factors) > 1 else ():
+    if len(structure.factors) == 1:
+        return []
+    for factor, names in zip(structure.factors, structure.own_names, strict=True):
         nature = structure.nature if factor.variable in ALONE[structure.nature] else "push"
         if factor.variable not in ALONE[nature]:
             continue
-        constants = {
-            name if name in factor.constants else name.removesuffix("2"): values[name]
-            for name, (own, _) in structure.constants.items()
-            if own is factor
-        }
+        constants = {name: values[own] for name, own in names.items()}
         # A drag is against the motion, which is forward.
         strength = values["c"] * (1.0 if nature == structure.nature else -1.0)
         alone = Structure(nature, structure.is_on_all, (factor,))

@@ -53,10 +53,7 @@ class Sight:
     ) -> np.ndarray:
         """Whether no friction would have to be negative, `[point of the grid]`.
 
-        Args:
-          structure: of a friction.
-          grid: of its constants.
-          strength: `[point of the grid, object]`, c times the coefficients.
+        `strength` is `[point of the grid, object]`, c times the coefficients.
         """
         found = np.ones(len(strength), bool)
         for i in range(strength.shape[1]):

@@ -22,8 +22,8 @@ import numpy as np
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
 from galileo_jax.diagnosis.laws.linearised_clip import Sight
 from galileo_jax.diagnosis.missing_force import View
+from galileo_jax.diagnosis.thresholds import LENGTH_ODDS
 
-LENGTH_NATS = log(10.0)  # a second factor makes a formula a tenth as probable
 NUM_LAWS, NUM_OF_FAMILY, NUM_STARTS = 8, 2, 3
 BEHIND = 40.0  # nats: what is further behind the best formula is not fitted, and
 BEHIND_SHARE = 0.1  # of its score: so wrong is a linear model of large changes
@@ -56,12 +56,7 @@ class Suggestion:
 
 
 def suggestions(views: Sequence[View], wanted: Collection[Shape] = ()) -> list[Suggestion]:
-    """The formulas that promise most, best first.
-
-    Args:
-      views: of each clip.
-      wanted: what is to be among them.
-    """
+    """The formulas that promise most, best first."""
     return chosen(_suggested(views), wanted)
 
 
@@ -159,13 +154,7 @@ def _grid(structure: Structure, ranges: Mapping[str, tuple[float, float]]) -> di
 def suggestion_of(
     sights: Sequence[Sight], structure: Structure, ranges: Mapping[str, tuple[float, float]]
 ) -> Suggestion | None:
-    """The best constants of a formula; None where it does not show.
-
-    Args:
-      sights: of each clip.
-      structure: of the formula.
-      ranges: of time and place, by variable.
-    """
+    """The best constants of a formula; None where it does not show."""
     grid = _grid(structure, ranges)
     gain, strength = _gains(sights, structure, grid)
     if not gain.size:
@@ -182,7 +171,7 @@ def suggestion_of(
     if structure.nature == "friction":  # the strength times each object's own coefficient
         numbers += (len(sights[0].responses) - 1) * structure.is_on_all
     price = 0.5 * numbers * log(sum(np.count_nonzero(sight.target) for sight in sights))
-    price += LENGTH_NATS * (len(structure.factors) - 1)
+    price -= log(LENGTH_ODDS) * (len(structure.factors) - 1)
     return Suggestion(structure, tuple(starts), tuple(strengths), highest - price)
 
 
@@ -208,9 +197,7 @@ def _apart(gain: np.ndarray, grid: Mapping[str, np.ndarray]) -> list[int]:
 def _hilltops(gain: np.ndarray, along: np.ndarray) -> list[int]:
     """The points of a grid that are the best at their value of one constant and beat both beside.
 
-    Args:
-      gain: `[point of the grid]`.
-      along: `[point of the grid]`, the constant.
+    Both are `[point of the grid]`, `along` values of the constant.
 
     Returns:
       Points, the best first.

@@ -1,1 +1,0 @@
-"""An acceleration that no effect explains, as a Gaussian process: its fit and its size."""

@@ -1,0 +1,110 @@
+"""Verdicts of tables of candidates, as far as these need comparisons with the data and new fits."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from galileo_jax.comparison.compare import Comparison, compare
+from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
+from galileo_jax.diagnosis.expected_evidence import expected_leads
+from galileo_jax.diagnosis.law_verdict import (
+    contested_by_law,
+    law_contested,
+    law_verdict,
+    other_formulas,
+)
+from galileo_jax.diagnosis.reasons import because
+from galileo_jax.diagnosis.thresholds import PAIR_P
+from galileo_jax.diagnosis.verdict import (
+    looked_at_again,
+    pair_ahead_of_all,
+    ranked,
+    rivals,
+    to_compare,
+    verdict_of,
+    within_luck,
+)
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.search.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges the candidates of one world.
+
+    Attributes:
+      trials: what was diagnosed.
+      decisive: difference in log odds, nats, at which one hypothesis rules out another.
+      seed: of the comparisons' replicates.
+      on_stage: told what is being done.
+      comparisons: made so far, with the fits that were compared, by effects.
+    """
+
+    trials: JointProblem
+    decisive: float
+    seed: int
+    on_stage: Callable[[str], None] = lambda _: None
+    comparisons: dict[tuple[str, ...], tuple[GradientFit, Comparison]] = field(default_factory=dict)
+
+    def comparison(self, hypothesis: Hypothesis) -> Comparison:
+        """A hypothesis compared with the data, once."""
+        known = self.comparisons.get(hypothesis.effects)
+        if known is None or known[0] is not hypothesis.fit:
+            made = compare(hypothesis.of(self.trials), hypothesis.fit, self.seed)
+            known = self.comparisons[hypothesis.effects] = hypothesis.fit, made
+        return known[1]
+
+    def compared(self, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+        """The candidates, ranked; the best with p-values and with what they are confounded with."""
+        table = ranked(candidates)
+        for c in to_compare(table, self.decisive):
+            self.comparison(c.hypothesis)
+        done = [replace(c, p_value=self._p_value(c)) for c in table]
+        return tuple(replace(c, confounded_with=rivals(c, done)) for c in done)
+
+    def _p_value(self, candidate: Candidate) -> float | None:
+        """As far as its fit was compared."""
+        fit, comparison = self.comparisons.get(candidate.effects, (None, None))
+        is_known = comparison is not None and fit is candidate.hypothesis.fit
+        return comparison.p_value if is_known else None
+
+    def verdict(self, candidates: Sequence[Candidate]) -> Verdict:
+        """On a table without laws; what is named was looked at again."""
+        found = verdict_of(candidates, self.decisive)
+        return found if found.status != "named" else self._looked_at_again(found, candidates)
+
+    def or_pair(self, verdict: Verdict, candidates: Sequence[Candidate]) -> Verdict:
+        """A pair in place of unknown, where it is ahead of all that was tried, formulas too."""
+        unknown = verdict.status == "unknown"
+        pair = pair_ahead_of_all(candidates, self.decisive) if unknown else None
+        if pair is None:
+            return verdict
+        why = because("explains", pair), because("pair_ahead", pair, least_p_value=PAIR_P)
+        named = Verdict("named", pair.effects, reasons=why)
+        return self._looked_at_again(named, candidates)
+
+    def or_law(self, before: Verdict, candidates: Sequence[Candidate]) -> Verdict:
+        """The verdict law where a formula does what a named effect must; else as before.
+
+        What a formula explains as well is contested.
+        """
+        law = law_verdict(candidates, self.decisive)
+        if law is None:
+            said = law_contested(candidates, self.decisive)
+            after = contested_by_law(before, candidates, self.decisive)
+            return replace(after, reasons=(*before.reasons, *said))
+        best = next(c for c in candidates if c.effects == law.effects)
+        again = self._looked_at_again(law, other_formulas(best, candidates))
+        if again.status == "law":
+            return again
+        unknown = replace(before, status="unknown", effects=())
+        return replace(unknown, reasons=(*before.reasons, *again.reasons))
+
+    def _looked_at_again(self, verdict: Verdict, candidates: Sequence[Candidate]) -> Verdict:
+        """A verdict for one hypothesis, if a clip like this one tells it from its confusables."""
+        self.on_stage("looking at what could be confused with it")
+        named = next(c for c in candidates if c.effects == verdict.effects)
+        alike = within_luck(named, candidates, self.decisive)
+        leads = expected_leads(self.trials, named, alike)
+        expected = list(zip(alike, leads, strict=True))
+        return looked_at_again(verdict, named, expected, self.decisive)
