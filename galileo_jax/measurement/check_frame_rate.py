@@ -12,7 +12,7 @@ large factors are therefore reported.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.model.scene.period import period_s
+from galileo_jax.observation.least_squares import least_squares, polynomial
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
@@ -28,25 +29,23 @@ LEAST_FACTOR_FREE = 1.4  # too few frames of what touches nothing: nothing else 
 SURE_SDS = 4.0  # by which gravity must be off
 UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
 PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
+LEAST_SHARE = 1 / PIXELS_FROM**2  # of gravity that rough friction leaves in another unit
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
 CHANCE = 1e-3  # that a path is called no parabola though it is one
 SINE = 0.3  # of its scatter is what a sine leaves of a swing at most
-MOST_FRICTION = 1.0  # on a level table
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
-MOVED_M = 0.003  # of the second object: it has been hit
 
 
-@dataclass(frozen=True)
-class ApparentGravity:
+class ApparentGravity(NamedTuple):
     """What gravity would be by the path, m/s^2.
 
     Attributes:
       value: the estimate.
-      sd: its standard deviation; 0 where it is not known.
       is_least: whether it can only be more: friction is not known.
+      sd: its standard deviation; 0 where it is not known.
     """
 
     value: float
@@ -99,7 +98,9 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     if scenario.is_level or scenario.angle_deg == 0:
         along = np.hypot(*np.array([x - x[0], y - y[0]]))
         slowing = _largest(accelerations(times, -along))
-        return None if slowing is None else ApparentGravity(slowing / MOST_FRICTION, is_least=True)
+        return (
+            None if slowing is None else ApparentGravity(slowing, is_least=True)
+        )  # friction is hardly more than 1
     if not scenario.has_ramp or not clip.ramp_angle_deg:
         return None
     angle = math.radians(clip.ramp_angle_deg)
@@ -116,45 +117,33 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
 
 def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | None:
     """By one parabola where nothing more than scatter is left of it, else by those of windows."""
-    found = _of_windows(accelerations(times, -height))
-    size = len(times) - 5
+    windows, size = accelerations(times, -height), len(times) - 5
+    value = _largest(windows)
+    if value is None:
+        found = None
+    else:
+        scatter = 1.4826 * float(np.median(np.abs(windows - value)))
+        found = ApparentGravity(value, sd=scatter / math.sqrt(len(windows) / 2))
     if size < 1 or np.ptp(height) == 0:
         return found
-    (left, parabola), (left_of_more, _) = (_polynomial(times, height, n) for n in (2, 4))
+    parabola, more = (polynomial(times - times.mean(), height, degree) for degree in (2, 4))
+    left, left_of_more = (float(np.sum(fit.left**2)) for fit in (parabola, more))
     gain = (left - left_of_more) / 2 / max(left_of_more / size, np.finfo(float).tiny)
     # Of Fisher's F with 2 and `size` degrees of freedom: P(F > x) = (1 + 2 x / size)^(-size / 2).
-    least = size / 2 * (CHANCE ** (-2 / size) - 1)
-    return found if gain > least else parabola
-
-
-def _polynomial(
-    times: np.ndarray, height: np.ndarray, degree: int
-) -> tuple[float, ApparentGravity]:
-    """(sum of squares that it leaves, gravity by its bend in the middle)."""
-    since = times - times.mean()
-    design = np.vander(since, degree + 1)
-    solution = np.linalg.lstsq(design, height, rcond=None)[0]
-    left = float(np.sum((height - design @ solution) ** 2))
-    scatter = left / (len(times) - degree - 1)
-    variance = scatter * float(np.linalg.inv(design.T @ design)[-3, -3])
-    return left, ApparentGravity(-2 * float(solution[-3]), sd=2 * math.sqrt(variance))
-
-
-def _of_windows(windows: np.ndarray) -> ApparentGravity | None:
-    found = _largest(windows)
-    return None if found is None else ApparentGravity(found, sd=_sd(windows, found))
+    if gain > size / 2 * (CHANCE ** (-2 / size) - 1):
+        return found
+    variance = left / (len(times) - 3) * float(parabola.inverse[0, 0])
+    return ApparentGravity(-2 * float(parabola.solution[0]), sd=2 * math.sqrt(variance))
 
 
 def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:
     """From its period; None of less than a period, or of a swing that is no sine."""
     period = period_s(times, x)
     turn = 2 * math.pi * times / period
-    design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
-    solution = np.linalg.lstsq(design, x, rcond=None)[0]
-    left = float(np.std(x - design @ solution) / np.std(x))
-    if np.ptp(times) < period or left > SINE:
+    fit = least_squares(np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1), x)
+    if np.ptp(times) < period or np.std(fit.left) > SINE * np.std(x):
         return None
-    amplitude = min(float(np.hypot(*solution[1:])) / thread_m, 1.0)
+    amplitude = min(float(np.hypot(*fit.solution[1:])) / thread_m, 1.0)
     longer = 1 + amplitude**2 / 16  # is the period than that of a narrow swing
     return ApparentGravity(thread_m * (2 * math.pi * longer / period) ** 2)
 
@@ -166,33 +155,22 @@ def _likely_unit(clip: Clip, found: ApparentGravity) -> tuple[str, float] | None
     """
     if clip.track is None or clip.track_units == "px" or clip.thread_m is not None:
         return None
-    value = found.value
-    key = "its columns in" if clip.is_own_track else "track_units:"
-    pixels = f"{key} px with {value / clip.gravity:.4g} pixels per metre"
-    are_pixels = value > PIXELS_FROM * clip.gravity
+    value, key = found.value, "its columns in" if clip.is_own_track else "track_units:"
     declared = METRES_PER_UNIT[clip.track_units or "m"]
-    off = {
-        unit: abs(math.log(value * metres / declared / clip.gravity))
-        for unit, metres in METRES_PER_UNIT.items()
+    shares = {
+        unit: value * metres / declared / clip.gravity for unit, metres in METRES_PER_UNIT.items()
     }
     if found.is_least:
-        would_do = [
-            unit for unit, metres in METRES_PER_UNIT.items()
-            if value * metres / declared / clip.gravity < LEAST_FACTOR
-            and (value / clip.gravity) * metres / declared > 1 / PIXELS_FROM**2
-        ]  # fmt: skip
+        would_do = [unit for unit, share in shares.items() if LEAST_SHARE < share < LEAST_FACTOR]
         return (f"{key} {' | '.join(would_do)}", math.inf) if would_do else None
-    best = min(off, key=lambda unit: off[unit])
-    if off[best] > max(UNIT_WITHIN, 2 * found.sd / value):
+    pixels = f"{key} px with {value / clip.gravity:.4g} pixels per metre"
+    are_pixels = value > PIXELS_FROM * clip.gravity
+    best = min(shares, key=lambda unit: abs(math.log(shares[unit])))
+    off = abs(math.log(shares[best]))
+    if off > max(UNIT_WITHIN, 2 * found.sd / value):
         return (pixels, math.inf) if are_pixels else None
-    would_be = value * METRES_PER_UNIT[best] / declared
-    words = f"{key} {best}, with which it would be {would_be:.3g} m/s^2"
-    return f"{words}, or {pixels}" if are_pixels else words, off[best]
-
-
-def _sd(windows: np.ndarray, value: float) -> float:
-    """How well the middle of the windows' accelerations is known."""
-    return 1.4826 * float(np.median(np.abs(windows - value))) / math.sqrt(len(windows) / 2)
+    words = f"{key} {best}, with which it would be {shares[best] * clip.gravity:.3g} m/s^2"
+    return f"{words}, or {pixels}" if are_pixels else words, off
 
 
 def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:
@@ -226,8 +204,9 @@ def _slowing(observation: Observation) -> float | None:
     seen, times = observation.mask[0], observation.times_s
     x = observation.position_m[0, 0]
     on_table = seen & (np.where(seen, x, -np.inf) > BEND_M)
-    hit = _moved_off(observation)
-    for stretch in (on_table & (times < hit), on_table & (times > hit)):
+    hit = None if len(observation.names) < 2 else observation.first_away(1)
+    hit_s = math.inf if hit is None else float(times[max(hit - 1, 0)])
+    for stretch in (on_table & (times < hit_s), on_table & (times > hit_s)):
         chosen = np.flatnonzero(stretch)
         speed = np.gradient(x[chosen], times[chosen]) if chosen.size > 1 else np.zeros(0)
         if speed.size and speed.max() > 0:
@@ -237,13 +216,3 @@ def _slowing(observation: Observation) -> float | None:
             continue
         return max(0.0, -2 * float(np.polyfit(times[chosen] - times[chosen[0]], x[chosen], 2)[0]))
     return None
-
-
-def _moved_off(observation: Observation) -> float:
-    """When the second object has been hit, s; inf where it never is."""
-    if len(observation.names) < 2 or not observation.mask[1].any():
-        return math.inf
-    x = np.where(observation.mask[1], observation.position_m[1, 0], np.nan)
-    first = x[np.flatnonzero(observation.mask[1])[0]]
-    moved = np.flatnonzero(np.abs(x - first) > MOVED_M)
-    return float(observation.times_s[max(moved[0] - 1, 0)]) if moved.size else math.inf

@@ -26,7 +26,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri, logsumexp
 
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import Observation, stretches
 from galileo_jax.observation.random_patterns import random_patterns
 from galileo_jax.tracking.noise import SETTLES_FRAMES
 
@@ -66,10 +66,9 @@ def with_errors_at_rest(observation: Observation) -> Observation:
     # The median: a window that holds the begin of a motion does not count.
     share = float(np.median(scatter) / chdtri(WINDOW - 1, 0.5))
     usual = float(np.clip(share, LEAST_SCALE**2, 1.0)) if len(scatter) >= MIN_WINDOWS else 1.0
-    covariance, modes = observation.covariance_m2.copy(), []
-    before = [] if observation.modes_m is None else list(observation.modes_m)
+    covariance, shifts, errors = observation.covariance_m2.copy(), [], []
     for i, (rests, _) in enumerate(looks):
-        before += _shifts(observation, i, rests, usual)
+        shifts += _shifts(observation, i, rests, usual)
         if len(scatter) < MIN_WINDOWS:
             continue
         for rest, axis in product(rests, range(observation.position_m.shape[1])):
@@ -81,9 +80,8 @@ def with_errors_at_rest(observation: Observation) -> Observation:
             for pattern in random_patterns(together, least):
                 mode = np.zeros_like(observation.position_m)
                 mode[i, axis, rest] = pattern * sd
-                modes.append(mode)
-    every = np.stack([*before, *modes]) if before or modes else None
-    return replace(observation, covariance_m2=covariance, modes_m=every, num_errors=len(modes))
+                errors.append(mode)
+    return replace(observation.with_modes(shifts, errors), covariance_m2=covariance)
 
 
 def _shifts(
@@ -125,11 +123,9 @@ def _look(observation: Observation, i: int) -> tuple[list[slice], Float[np.ndarr
     white = (place - place.mean(axis=-1, keepdims=True)) / np.sqrt(variance)
     away = np.nan_to_num(np.abs(white).max(axis=(0, 2)), nan=np.inf)
     still = windows(mask, WINDOW).all(axis=-1) & (away < STILL_SDS)
-    steps = np.diff(np.convolve(still, np.ones(WINDOW)) > 0, prepend=False, append=False)
-    ends = np.flatnonzero(steps).tolist()
     rests = [
-        slice(first + (SETTLES if first else 0), after)
-        for first, after in zip(ends[::2], ends[1::2], strict=True)
+        slice(rest.start + (SETTLES if rest.start else 0), rest.stop)
+        for rest in stretches(np.convolve(still, np.ones(WINDOW)) > 0)
     ]
     return [r for r in rests if r.start < r.stop], (white[:, still] ** 2).sum(axis=-1).reshape(-1)
 

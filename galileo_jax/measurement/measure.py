@@ -1,50 +1,37 @@
 """Measures a clip: object positions in metres, and what its yaml leaves open.
 
-The yaml may leave open the angle, the origin and sizes.
+The way of a film, top to bottom:
+
+    tracking       frames -> places in pixels, with errors          (`tracking.clip.track_clip`)
+    in_metres      pixels -> places in metres, with errors          (`observed`)
+    infer_*        angle, foot, sizes, scale that the yaml leaves open
+    segments       which part of the track is motion of the scene   (`segments.segment`)
+    measure        all of it: the `Observation` that a model is compared with
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from galileo_jax.clip.lost_frames import lost_text, with_lost_frames
+from galileo_jax.clip.lost_frames import lost_text
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_file import read_track
 from galileo_jax.measurement.average_rows import with_rows_averaged
-from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
-from galileo_jax.measurement.coding_errors import with_coding_errors
-from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
-from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
-from galileo_jax.measurement.infer_radii import (
-    from_first_common_frame,
-    is_level,
-    told_by_hit,
-    with_walls_in_metres,
-)
-from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
-from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
+from galileo_jax.measurement.in_metres import observed
+from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
+from galileo_jax.measurement.infer_ramp import SIZE_SD_M, infer_foot, infer_sizes, infer_slope
 from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
-from galileo_jax.measurement.segments.segments import (
-    HELD,
-    Cut,
-    Phase,
-    Segments,
-    cuts_of,
-    segment,
-)
+from galileo_jax.measurement.segments.segments import HELD, Cut, Phase, Segments, cuts_of, segment
 from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
-from galileo_jax.measurement.shared_errors import beside, with_errors
-from galileo_jax.measurement.track_cache import track_once
-from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
-from galileo_jax.tracking.to_metres import observe
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
 LEAST_FRAMES, LEAST_SHARE = 8, 0.5
@@ -125,65 +112,80 @@ def inferred(measured: Sequence[Measurement]) -> dict[str, Any]:
     return ({"inferred": found} if found else {}) | cuts_of(measured)
 
 
+@dataclass
+class _Inferring:
+    """What has been inferred so far, and the lines that say so."""
+
+    path: Path
+    inferred: dict[str, Any] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    def say(self, *lines: str) -> None:
+        """Keeps lines without the clip's name."""
+        self.remarks += [f"{self.path}: {line}" for line in lines]
+
+
 def measure(clip: Clip) -> Measurement:
     """Tracks a clip's video, or reads its track, and infers what the model needs and is null.
 
     Raises:
       InputError: an object cannot be followed, or its path does not tell the ramp's angle or foot.
     """
-    found: dict[str, Any] = {}
-    remarks: list[str] = []
-    if needs_foot(clip):
-        clip = _with_foot(clip, remarks)
-        found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
-    measured = _with_slope(clip, remarks) if needs_slope(clip) else _on_its_way(clip)
-    measured = _with_pucks(measured, remarks) if is_level(clip) else measured
-    measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
-    pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
+    scenario, told = SCENARIOS[clip.scenario], _Inferring(clip.path)
+    in_pixels = clip.track_units in (None, "px")
+    if scenario.has_table and in_pixels and clip.origin_px is None:
+        clip = _with_foot(clip, told)
+    needs_slope, way = scenario.has_ramp and clip.ramp_angle_deg is None, None
+    if needs_slope and clip.video is not None:
+        # The object's outline stands along the ramp: a first look, without it, tells how steep.
+        clip = _inclined(clip, observed(_without_sizes(clip))[0])
+    whole, pixels = observed(clip)
+    if needs_slope:
+        clip = _inclined(clip, whole, told)
+    else:
+        is_table = not whole.is_tracked_here
+        way = other_way(clip, segment(clip, whole).used(whole), may_turn=is_table)
+        whole = turned_back(clip, whole, way) if way and way.is_turned_back else whole
+    if scenario.is_level:
+        clip, whole = _with_pucks(clip, whole, pixels, told)
+    if scenario.has_table and any(item.size_m is None for item in clip.objects):
+        clip = _with_sizes(clip, whole, told)
+    doubt = frame_rate_doubt(clip, whole)
     if pixels is not None:
-        remarks.extend(
-            lost_text(
-                clip.path, np.array(clip.frame_times_s)[: len(pixels.times_s)], pixels.times_s
-            )
-        )
-    segments = segment(measured.clip, measured.observation, pixels)
-    remarks.extend(f"{clip.path}: {each}" for each in segments.cuts)
-    observation = segments.used(measured.observation)
-    measured = replace(measured, clip=_moving(measured.clip, observation, segments, remarks))
-    if is_level(measured.clip) or clip.scenario == "toss":
+        times_s = np.array(clip.frame_times_s)[: len(pixels.times_s)]
+        told.remarks += lost_text(clip.path, times_s, pixels.times_s)
+    segments = segment(clip, whole, pixels)
+    told.say(*map(str, segments.cuts))
+    observation = segments.used(whole)
+    clip = _moving(clip, observation, segments, told)
+    if scenario.is_level or clip.scenario == "toss":
         # The places of a ball in space are as uncertain along its way as its times, which a wander
         # that is told by the track would take for it.
-        pucks = measured.clip
-        observation = with_wander(observation, pucks.objects, pucks.walls)
+        observation = with_wander(observation, clip.objects, clip.walls)
     frames_used = int(observation.mask.any(axis=0).sum())
     if not observation.is_tracked_here:
         observation, said = with_rows_averaged(observation)
-        remarks.extend(f"{clip.path}: {line}" for line in said)
-    other_doubts = (
+        told.say(*said)
+    doubts = [] if way is None else [f"{clip.path}: {way_text(clip, way)}"]
+    doubts += [] if doubt is None else [doubt]
+    doubts += [
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
         for one in segments.astray
+    ]
+    return Measurement(
+        clip,
+        observation,
+        whole,
+        pixels,
+        told.inferred,
+        segments,
+        tuple(doubts),
+        tuple(told.remarks),
+        way,
+        frames_used,
+        frames=len(whole.times_s),
+        frames_of_scene=_of_scene(clip, whole, segments, pixels),
     )
-    way = [] if measured.way is None else [f"{clip.path}: {way_text(clip, measured.way)}"]
-    return replace(
-        measured,
-        observation=observation,
-        inferred={**found, **measured.inferred},
-        segments=segments,
-        doubts=(*way, *([] if doubt is None else [doubt]), *other_doubts),
-        remarks=tuple(remarks),
-        frames_used=frames_used,
-        frames=len(measured.whole.times_s),
-        frames_of_scene=_of_scene(clip, measured.whole, segments, pixels),
-    )
-
-
-def _on_its_way(clip: Clip) -> Measurement:
-    """A measurement whose points are turned, if need be, to where the clip says that they go."""
-    whole, pixels = observed(clip)
-    way = other_way(clip, segment(clip, whole).used(whole), may_turn=not whole.is_tracked_here)
-    if way is not None and way.is_turned_back:
-        whole = turned_back(clip, whole, way)
-    return Measurement(clip, whole, whole, pixels, way=way)
 
 
 def _of_scene(clip: Clip, whole: Observation, segments: Segments, pixels: Track | None) -> int:
@@ -205,22 +207,30 @@ def _left_picture(track: Track) -> int:
     return max(gone)
 
 
-def _moving(clip: Clip, observation: Observation, segments: Segments, remarks: list[str]) -> Clip:
+def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inferring) -> Clip:
     """The clip with `starts_moving`, where nobody lets the object go in what is left of it.
 
     On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
     and not assumed.
     """
-    scenario = SCENARIOS[clip.scenario]
-    if any(each.why == HELD for each in segments.cuts) and "starts_moving" in scenario.keys:
-        return clip.model_copy(update={"starts_moving": True})
-    if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
+    scenario, first = SCENARIOS[clip.scenario], clip.objects[0]
+    if "starts_moving" not in scenario.keys:
+        return clip
+    moving = clip.model_copy(update={"starts_moving": True})
+    if any(each.why == HELD for each in segments.cuts):
+        return moving
+    if clip.starts_moving is not None:
         return clip
     seen = on_ramp(observation) if scenario.has_table else observation
-    found, name = start_speed(seen), clip.objects[0].name
+    found = start_speed(seen)
     if found is None:
-        if clip.scenario == "ramp" and clip.objects[0].first_frame is not None:
-            remarks.extend(_resting(clip, rest_s(seen)))
+        is_declared = clip.scenario == "ramp" and first.first_frame is not None
+        if is_declared and (rests_s := rest_s(seen)) is not None:
+            told.say(
+                f"{first.name} rests for {rests_s:.2g} s from frame {first.first_frame} on, where "
+                "it is declared to be let go; write `first_frame: null` for it, which takes the "
+                "release from the motion, or try the effect release_delay"
+            )
         return clip
     how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
     what_then = (
@@ -228,75 +238,8 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, remarks: l
         if scenario.has_table
         else "its speed there is inferred (`starts_moving: false` if it is at rest there)"
     )
-    remarks.append(
-        f"{clip.path}: {name} moves already in the first frame that is used{how_fast}; {what_then}"
-    )
-    return clip if scenario.has_table else clip.model_copy(update={"starts_moving": True})
-
-
-def _resting(clip: Clip, rests_s: float | None) -> tuple[str, ...]:
-    """That object 1 is let go later than in its first frame, a line; nothing where it is not."""
-    if rests_s is None:
-        return ()
-    name, first = clip.objects[0].name, clip.objects[0].first_frame
-    return (
-        f"{clip.path}: {name} rests for {rests_s:.2g} s from frame {first} on, where it "
-        "is declared to be let go; write `first_frame: null` for it, which takes the release from "
-        "the motion, or try the effect release_delay",
-    )
-
-
-def observed(clip: Clip) -> tuple[Observation, Track | None]:
-    """The clip's track in metres, and in pixels where it is tracked here.
-
-    Raises:
-      InputError: an object cannot be followed.
-    """
-    if clip.video is None:
-        assert clip.track is not None  # load_clip requires one of the two
-        read = read_track(clip.path, clip.track, clip, clip.fps)
-        observation = (
-            with_errors(beside(clip.track), read.observation) if read.is_own else read.observation
-        )
-        return _as_declared(clip, observation), None
-    pixels = track_once(clip)
-    seen = np.where(pixels.is_visible[..., None], pixels.position_px, np.nan)
-    times_s = with_lost_frames(pixels.times_s, np.moveaxis(seen, 1, 2))
-    pixels = replace(pixels, times_s=times_s)
-    observation = with_errors_at_rest(observe(clip, pixels))
-    observation = with_coding_errors(clip, observation, pixels)
-    observation = with_camera_modes(clip, observation, pixels)
-    return with_turning(observation) if clip.turning else observation, pixels
-
-
-def _as_declared(clip: Clip, observation: Observation) -> Observation:
-    """Without what is before the first and after the last frames; tracking begins and ends so."""
-    for i, item in enumerate(clip.objects):
-        observation = observation.without(slice(item.first_frame or 0), i)
-        if item.last_frame is not None:
-            observation = observation.without(slice(item.last_frame + 1, None), i)
-    return observation
-
-
-def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
-    """The clip with the foot of its ramp, from a first look at the path."""
-    assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
-    about = (0.0, 0.0) if clip.rectangle is None else clip.rectangle.corners_px[0]
-    first_look, _ = observed(_without_sizes(clip, origin_px=about))
-    x, y = picture_plane(clip, about).to_pixels(infer_foot(clip, first_look))
-    origin = (round(float(x), 1), round(float(y), 1))
-    clip = clip.model_copy(update={"origin_px": origin})
-    remarks.append(
-        f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is used, from "
-        f"the bend of {clip.objects[0].name}'s path"
-    )
-    return clip
-
-
-def _foot_sd_px(clip: Clip) -> float:
-    """As good as the point that was followed is the object's centre."""
-    assert clip.pixels_per_metre is not None
-    return round(SIZE_SD_M * clip.pixels_per_metre, 1)
+    told.say(f"{first.name} moves already in the first frame that is used{how_fast}; {what_then}")
+    return clip if scenario.has_table else moving
 
 
 def _without_sizes(clip: Clip, **update: Any) -> Clip:
@@ -305,48 +248,57 @@ def _without_sizes(clip: Clip, **update: Any) -> Clip:
     return clip.model_copy(update={"objects": unknown, **update})
 
 
-def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
-    """A measurement with the ramp's angle from the path."""
-    if clip.video is not None:
-        # The object's outline stands along the ramp: a first look, without it, tells how steep.
-        first_look, _ = observed(_without_sizes(clip))
-        clip = _inclined(clip, infer_slope(clip, segment(clip, first_look).used(first_look)))
-    observation, pixels = observed(clip)
-    slope = infer_slope(clip, segment(clip, observation).used(observation))
-    clip = _inclined(clip, slope)
-    remarks.append(
-        f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
-        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is used"
+def _with_foot(clip: Clip, told: _Inferring) -> Clip:
+    """The clip with the foot of its ramp, from a first look at the path."""
+    assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
+    about = (0.0, 0.0) if clip.rectangle is None else clip.rectangle.corners_px[0]
+    first_look, _ = observed(_without_sizes(clip, origin_px=about))
+    x, y = picture_plane(clip, about).to_pixels(infer_foot(clip, first_look))
+    origin = (round(float(x), 1), round(float(y), 1))
+    # As good as the point that was followed is the object's centre.
+    sd_px = round(SIZE_SD_M * clip.pixels_per_metre, 1)
+    told.inferred["origin_px"] = {"mean": list(origin), "sd": sd_px}
+    told.say(
+        f"origin_px: null; {list(origin)} +- {sd_px:.1f} is used, from the bend of "
+        f"{clip.objects[0].name}'s path"
     )
-    found = {"mean": slope.angle_deg, "sd": slope.sd_deg}
-    return Measurement(clip, observation, observation, pixels, {"ramp_angle_deg": found})
+    return clip.model_copy(update={"origin_px": origin})
 
 
-def _with_sizes(measured: Measurement, remarks: list[str]) -> Measurement:
-    """The measurement with sizes from the heights of the paths and the distance at the hit."""
-    clip = measured.clip
-    found = infer_sizes(clip, measured.observation)
+def _inclined(clip: Clip, observation: Observation, told: _Inferring | None = None) -> Clip:
+    """The clip with the ramp's angle from the path; without `told` nothing is said of it."""
+    slope = infer_slope(clip, segment(clip, observation).used(observation))
+    if told is not None:
+        told.inferred["ramp_angle_deg"] = {"mean": slope.angle_deg, "sd": slope.sd_deg}
+        told.say(
+            f"ramp_angle_deg: null; {observation.names[0]}'s path falls by "
+            f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is used"
+        )
+    found = {"ramp_angle_deg": slope.angle_deg, "ramp_angle_sd_deg": slope.sd_deg}
+    return clip.model_copy(update=found)
+
+
+def _with_sizes(clip: Clip, observation: Observation, told: _Inferring) -> Clip:
+    """The clip with sizes from the heights of the paths and the distance at the hit."""
+    found = infer_sizes(clip, observation)
+    for name, size in found.items():
+        told.say(f"{name}: size_m: null; {list(size)} is used, from its path")
+        told.inferred[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
     objects = tuple(
         item.model_copy(update={"size_m": found.get(item.name, item.size_m)})
         for item in clip.objects
     )
-    entries = dict(measured.inferred)
-    for name, size in found.items():
-        remarks.append(f"{clip.path}: {name}: size_m: null; {list(size)} is used, from its path")
-        entries[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
-    clip = clip.model_copy(update={"objects": objects})
-    return replace(measured, clip=clip, inferred=entries)
+    return clip.model_copy(update={"objects": objects})
 
 
-def _with_pucks(measured: Measurement, remarks: list[str]) -> Measurement:
-    """The measurement from where all pucks are seen on, with the scale or radii from a hit."""
-    observation = from_first_common_frame(measured.clip, measured.observation)
-    clip, observation, found, said = told_by_hit(measured.clip, observation)
-    clip = with_walls_in_metres(clip, measured.pixels)
-    remarks.extend(f"{clip.path}: {line}" for line in said)
-    return replace(measured, clip=clip, observation=observation, whole=observation, inferred=found)
-
-
-def _inclined(clip: Clip, slope: Slope) -> Clip:
-    found = {"ramp_angle_deg": slope.angle_deg, "ramp_angle_sd_deg": slope.sd_deg}
-    return clip.model_copy(update=found)
+def _with_pucks(
+    clip: Clip, whole: Observation, pixels: Track | None, told: _Inferring
+) -> tuple[Clip, Observation]:
+    """From where all pucks are seen on, with the scale or radii from a hit."""
+    common = np.flatnonzero(whole.mask.all(axis=0))
+    if not common.size:
+        raise InputError(f"{clip.path}: there is no frame in which every object is seen")
+    clip, whole, found, said = told_by_hit(clip, whole.without(slice(common[0])))
+    told.inferred |= found
+    told.say(*said)
+    return with_walls_in_metres(clip, pixels), whole

@@ -15,14 +15,14 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
-from galileo_jax.measurement.infer_slope import LEVEL_SD_DEG
+from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG, MIN_POINTS, falls_deg
+from galileo_jax.observation.least_squares import line_through
 from galileo_jax.observation.observation import Observation
 
 CLEAR = 4.0
 TURNED_DEG = 6.0
 NEARER = 3.0
 """By so many times an axis of a table must be nearer to the path than the declared way."""
-FEWEST = 5  # points
 STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
 
@@ -52,23 +52,26 @@ def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay 
       may_turn: whether its axes may be any.
     """
     scenario = SCENARIOS[clip.scenario]
-    if scenario.moves_in_plane or scenario.is_level or scenario.has_table:
-        return None
-    if scenario.has_ramp and clip.ramp_angle_deg is None:
-        return None
     declared = clip.ramp_angle_deg if scenario.has_ramp else 90.0
-    assert declared is not None
-    found = _direction(observation)
-    if found is None:
+    is_line = not (scenario.moves_in_plane or scenario.is_level or scenario.has_table)
+    points = observation.position_m[0][:, observation.mask[0]]
+    if not is_line or declared is None or len(points) != 2 or points.shape[1] < MIN_POINTS:
         return None
-    along, sd, is_straight = found
-    path = _below_horizontal_deg(along)
-    apart = abs(_turn_deg(declared, path, "spring" in scenario.laws))
-    known = math.hypot(sd, LEVEL_SD_DEG, clip.ramp_angle_sd_deg)
+    line = line_through(points)
+    away = points - line.middle[:, None]
+    if not (length := float(np.ptp(line.along @ away))):
+        return None
+    noise = float(np.median(observation.variance_m2[0, observation.mask[0]]))
+    scatter = max(line.spread[0] / (points.shape[1] - 2), noise)
+    sd = math.degrees(math.sqrt(scatter / line.spread[1]))
+    path = falls_deg(line)
+    period = 180.0 if "spring" in scenario.laws else 360.0  # what goes to and fro has no end
+    apart = abs((declared - path + period / 2) % period - period / 2)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
-    is_along_axis = apart > NEARER * max(off_axis, sd)
-    if may_turn and is_along_axis:
+    if may_turn and apart > NEARER * max(off_axis, sd):
         return OtherWay(declared, path, sd, True)
+    known = math.hypot(sd, LEVEL_SD_DEG, clip.ramp_angle_sd_deg)
+    is_straight = np.abs(line.across @ away).max() <= STRAIGHT * length
     if sd > MOST_SD_DEG or not is_straight or apart < CLEAR * known:
         return None
     return OtherWay(declared, path, sd, may_turn and apart > TURNED_DEG)
@@ -97,41 +100,12 @@ def way_text(clip: Clip, way: OtherWay) -> str:
         else f"{'level' if scenario.has_ramp else 'straight down'} is what scenario "
         f"{clip.scenario} says"
     )
-    text = (
-        f"{clip.objects[0].name}'s path {falls} by {abs(way.path_deg):.1f} +- {way.sd_deg:.1g} "
-        f"degrees, but {declared}"
+    what_then = (
+        "; the axes are taken to be turned, and the declared angle is used"
+        if way.is_turned_back
+        else ", which is used; check the angle, and whether the camera stood level"
     )
-    if way.is_turned_back:
-        return f"{text}; the axes are taken to be turned, and the declared angle is used"
-    return f"{text}, which is used; check the angle, and whether the camera stood level"
-
-
-def _turn_deg(declared_deg: float, path_deg: float, is_either: bool) -> float:
-    """From the path to the declared way, -180 to 180; -90 to 90 of what goes to and fro."""
-    period = 180.0 if is_either else 360.0
-    return (declared_deg - path_deg + period / 2) % period - period / 2
-
-
-def _below_horizontal_deg(along: np.ndarray) -> float:
-    return math.degrees(math.atan2(-along[1], along[0]))
-
-
-def _direction(observation: Observation) -> tuple[np.ndarray, float, bool] | None:
-    """A unit vector along the path, its sd in degrees, and whether the path is straight."""
-    if observation.position_m.shape[1] != 2:
-        return None
-    points = observation.position_m[0][:, observation.mask[0]]
-    if points.shape[1] < FEWEST:
-        return None
-    gone = points - points[:, :1]
-    away = points - points.mean(axis=1, keepdims=True)
-    values, axes = np.linalg.eigh(away @ away.T)
-    furthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
-    along = axes[:, 1] * math.copysign(1.0, axes[:, 1] @ furthest)
-    length = float(np.ptp(along @ away))
-    if not length:
-        return None
-    is_straight = bool(np.abs(axes[:, 0] @ away).max() <= STRAIGHT * length)
-    noise = float(np.median(observation.variance_m2[0, observation.mask[0]]))
-    scatter = max(float(values[0]) / (points.shape[1] - 2), noise)
-    return along, math.degrees(math.sqrt(scatter / float(values[1]))), is_straight
+    return (
+        f"{clip.objects[0].name}'s path {falls} by {abs(way.path_deg):.1f} +- {way.sd_deg:.1g} "
+        f"degrees, but {declared}{what_then}"
+    )

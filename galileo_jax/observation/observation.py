@@ -1,5 +1,6 @@
 """An observation: what was measured, in metres and seconds, with its errors."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,6 +170,16 @@ class Observation:
             modes_m=None if modes is None else modes[..., frames],
             turned_rad=None if turned is None else turned[:, frames],
         )
+
+    def with_modes(
+        self,
+        imperfections: Sequence[Float[np.ndarray, "object axis frame"]] = (),
+        errors: Sequence[Float[np.ndarray, "object axis frame"]] = (),
+    ) -> "Observation":
+        """The observation with more `modes_m`: what may be off, and errors."""
+        modes = [*imperfections, *(() if self.modes_m is None else self.modes_m), *errors]
+        number = self.num_errors + len(errors)
+        return replace(self, modes_m=np.stack(modes) if modes else None, num_errors=number)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ import yaml
 
 import galileo_jax as gx
 from galileo_jax.clip.picture_plane import nearby_planes
+from galileo_jax.measurement.in_metres import observe
 from galileo_jax.measurement.measure import Measurement, measure
-from galileo_jax.tracking.to_metres import observe
 from galileo_jax.video.decode import frames
 from tests.clip.test_picture_plane import filmed
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.measurement.coding_errors import with_coding_errors
+from galileo_jax.measurement.in_metres import observe, with_coding_errors
 from galileo_jax.tracking.motion_compensation import LASTS_FRAMES
-from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
 FRAMES, SCALE, NOISE_PX = 40, 800.0, 0.01

@@ -7,7 +7,7 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
-from galileo_jax.measurement.segments.bounce import bounce_frame
+from galileo_jax.measurement.segments.blow import bounce_frame
 from galileo_jax.measurement.segments.segments import STRUCK
 from galileo_jax.observation.observation import Observation
 

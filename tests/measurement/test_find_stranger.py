@@ -10,7 +10,8 @@ import yaml
 import galileo_jax as gx
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.walls import bounces
-from galileo_jax.measurement.measure import measure, observed
+from galileo_jax.measurement.in_metres import observed
+from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
 from galileo_jax.measurement.segments.segments import RESTS, STRUCK
 

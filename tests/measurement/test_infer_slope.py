@@ -10,7 +10,7 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command, export, fit
-from galileo_jax.measurement.infer_slope import LEVEL_SD_DEG
+from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
 from galileo_jax.measurement.measure import inferred, measure
 from galileo_jax.runtime.errors import InputError
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.measurement.in_metres import observe
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
 PX = np.array([[[310.0, 150.0], [320.0, 160.0], [330.0, 175.0]]])

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.measurement.in_metres import observe
 from galileo_jax.tracking.fragments import Piece
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.noise import MEMORY_FRAMES, SAMPLING_SD_PX
 from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, velocities_at
 from galileo_jax.tracking.square_view import square_view
-from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 from tests.clip.test_picture_plane import CAMERA, SIDES_M, filmed
 

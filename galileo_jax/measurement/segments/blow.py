@@ -1,26 +1,11 @@
-"""A blow, or a stop: the velocity jumps, and nothing in the scene is there to hit.
-
-Between the steps a and b around a frame, with d the time between their middles, it is a blow if
-of the change of velocity c = v_b - v_a
-
-    |c| > HIT_M_S2 times a step            (no friction, drag or weight accelerates so)
-    |c| > SHARE of the speed before        (a bump on the way is none)
-    |c| > CLEAR standard deviations of c
-    |c| / d > USUAL times what the run's own accelerations are (three in four are smaller):
-                                           lengths may be in units that nobody knows
-
-where v_a and v_b are medians of the steps on either side, so that no single point makes a blow.
-Medians are blind to a step or two. So when it was is told by two parabolas, one to the last frame
-before the blow and one from the next on: that frame is taken with which they leave least, or the
-latest that leaves hardly more, for a frame of the blow itself lies on both. As errors may be larger
-in one direction than in another (along the way, where times are not known well), what they leave is
-the determinant of its scatter. A blow that lasts takes further frames: those that do not lie where
-the parabola of the frames before them goes on to.
-"""
+"""A blow, a stop or a bounce: the velocity jumps, and nothing in the scene is there to hit."""
 
 import numpy as np
+from jaxtyping import Bool
+from scipy import special
 
-from galileo_jax.observation.observation import Observation, PointPath
+from galileo_jax.observation.least_squares import least_squares, polynomial
+from galileo_jax.observation.observation import Observation, PointPath, stretches
 
 HIT_M_S2 = 20.0  # two g
 SHARE = 0.3
@@ -32,13 +17,36 @@ SMEARED = 2  # steps into which the blow itself may fall
 PARABOLA_FRAMES, FEWEST = 10, 4  # on either side of a blow
 AS_WELL = 9.0  # in -2 log likelihood: three standard deviations
 SLOWED, STEADY, STOP_CLEAR, BEFORE = 0.6, 0.9, 5.0, 3  # of a stop
-SMEARED_FRAMES = 1
-"""Of a video: the hit falls into an exposure, whose frame shows neither."""
 FLOOR = 0.01  # of the track's variance: a few points may leave nothing in some direction
+BOUNCE_CHANCE, BOUNCE_SHARE = 1e-6, 0.1  # a flight has tens of frames
+
+
+def jumps(path: PointPath, most_m_s2: float, clear: float) -> Bool[np.ndarray, " middle"]:
+    """Whether the velocity changes beyond an acceleration and noise, for each place but the ends.
+
+    Args:
+      path: of an object.
+      most_m_s2: nothing but a blow accelerates so.
+      clear: standard deviations of the change that are no noise.
+    """
+    step_s, velocity, sd = path.steps
+    change = np.linalg.norm(np.diff(velocity[:2]), axis=0)
+    return change > most_m_s2 * (step_s[1:] + step_s[:-1]) / 2 + clear * np.hypot(sd[1:], sd[:-1])
 
 
 def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False) -> int | None:
     """The last frame before an object is struck; None where nothing strikes it.
+
+    With c = v_b - v_a the change of velocity between the medians of the `STEPS` steps on either
+    side of a frame, d the time between their middles, it is a blow if
+
+        |c| > HIT_M_S2 times a step            (no friction, drag or weight accelerates so)
+        |c| > SHARE of the speed before        (a bump on the way is none)
+        |c| > CLEAR standard deviations of c
+        |c| / d > USUAL times what the run's own accelerations are (three in four are smaller):
+                                               lengths may be in units that nobody knows
+
+    so that no single point makes a blow. When it was is told by `last_before`.
 
     Args:
       observation: its x and y count, and z in space.
@@ -49,48 +57,47 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     if len(path) < 2 * STEPS + SMEARED + 2:
         return None
     step_s, velocity, sd = path.steps
-    middle_s = path.times_s[:-1] + step_s / 2
-    windows = np.lib.stride_tricks.sliding_window_view(velocity, STEPS, axis=1)
-    usual, error = np.median(windows, axis=-1), _median(sd) / np.sqrt(STEPS)
-    centre_s = _median(middle_s)
+    usual, error = _medians(velocity), _medians(sd) / np.sqrt(STEPS)
+    middle_s = _medians(path.times_s[:-1] + step_s / 2)
     # From the middle of one window to that of the next which shares no step with it.
-    apart = STEPS + SMEARED - 1
-    change = usual[:, apart:] - usual[:, :-apart]
-    size = np.linalg.norm(change, axis=0)
-    # Steady acceleration of the run itself, over as much time.
-    between_s = centre_s[apart:] - centre_s[:-apart]
+    before, after = slice(None, -(STEPS + SMEARED - 1)), slice(STEPS + SMEARED - 1, None)
+    size = np.linalg.norm(usual[:, after] - usual[:, before], axis=0)
+    between_s = middle_s[after] - middle_s[before]
     steady = np.quantile(size / between_s, 0.75) * between_s
     speed = np.linalg.norm(usual, axis=0)
-    clear = CLEAR * np.hypot(error[apart:], error[:-apart]) * np.sqrt(np.pi / 2)
-    jump_s = np.median(step_s)
+    clear = CLEAR * np.hypot(error[after], error[before]) * np.sqrt(np.pi / 2)
     beyond = size - steady
-    is_blow = (beyond > HIT_M_S2 * jump_s) & (size > USUAL * steady) & (beyond > clear)
-    is_blow &= size > SHARE * np.maximum(speed[:-apart], speed[apart:])
+    is_blow = (beyond > HIT_M_S2 * np.median(step_s)) & (size > USUAL * steady) & (beyond > clear)
+    is_blow &= size > SHARE * np.maximum(speed[before], speed[after])
     if not from_rest:
-        is_blow &= speed[:-apart] > clear  # what is at rest is let go, not struck
+        is_blow &= speed[before] > clear
     if not is_blow.any():
         return None
-    first = int(np.argmax(is_blow))
-    last = first + int(np.argmin(np.append(is_blow[first:], False)))
     # Of the windows that see it, those in whose middle it is: there the change is largest.
-    at = first + int(np.argmax(size[first:last]))
+    first = stretches(is_blow)[0]
+    at = first.start + int(np.argmax(size[first]))
     return int(path.frames[last_before(path, at + STEPS)])
 
 
 def last_before(path: PointPath, about: int) -> int:
-    """The last place before a blow that is within `STEPS` places of `about`."""
+    """The last place before a blow that is within `STEPS` places of `about`.
+
+    One parabola goes to it, one from the next place on. That place is taken with which they leave
+    least, or the latest that leaves hardly more, for a frame of the blow itself lies on both. As
+    errors may be larger along the way than across, what they leave is the determinant of its
+    scatter. A blow that lasts takes further frames: those off the parabola of the frames before.
+    """
     begin, end = max(about - PARABOLA_FRAMES + 1, 0), about + PARABOLA_FRAMES + 1
-    times, place = path.times_s[begin:end] - path.times_s[about], path.place_m[:, begin:end]
-    floor = FLOOR * float(np.median(path.variance_m2[begin:end])) * np.eye(len(place))
-    left = {}
+    times, place = path.times_s[begin:end] - path.times_s[about], path.place_m[:, begin:end].T
+    floor = FLOOR * float(np.median(path.variance_m2[begin:end])) * np.eye(place.shape[1])
+    cost = {}
     for last in range(about - STEPS, about + STEPS + 1):
         sides = slice(None, last + 1 - begin), slice(last + 1 - begin, None)
         if min(len(times[side]) for side in sides) < FEWEST:
             continue
-        beside = np.concatenate([_beside(times[side], place[:, side]) for side in sides], axis=1)
-        count = beside.shape[1]
-        left[last] = count * np.linalg.slogdet(beside @ beside.T / count + floor)[1]
-    last = max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
+        left = np.concatenate([polynomial(times[side], place[side], 2).left for side in sides])
+        cost[last] = len(left) * np.linalg.slogdet(left.T @ left / len(left) + floor)[1]
+    last = max(last for last, one in cost.items() if one <= min(cost.values()) + AS_WELL)
     for _ in range(SMEARED):
         if continues(path, last):
             break
@@ -104,24 +111,13 @@ def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
     Without `own` it is that of those before it.
     """
     own = slice(max(last - PARABOLA_FRAMES, 0), last) if own is None else own
-    place_m = path.place_m
     since = path.times_s[own] - path.times_s[last]
     if len(since) < FEWEST:
         return True
-    design = np.vander(since, 3)
-    solution = np.linalg.lstsq(design, place_m[:, own].T, rcond=None)[0]
-    beside = place_m[:, own].T - design @ solution
-    scatter = np.sum(beside**2, axis=0) / max(len(since) - 3, 1)
-    known = np.maximum(scatter, path.variance_m2[last]) * (
-        1 + np.linalg.inv(design.T @ design)[2, 2]
-    )
-    return bool(np.all((place_m[:, last] - solution[2]) ** 2 <= CLEAR**2 * known))
-
-
-def _beside(times_s: np.ndarray, place_m: np.ndarray) -> np.ndarray:
-    """What a parabola leaves, `[axis, frame]`, m."""
-    design = np.vander(times_s, 3)
-    return place_m - (design @ np.linalg.lstsq(design, place_m.T, rcond=None)[0]).T
+    fit = polynomial(since, path.place_m[:, own].T, 2)
+    scatter = np.sum(fit.left**2, axis=0) / max(len(since) - 3, 1)
+    known = np.maximum(scatter, path.variance_m2[last]) * (1 + fit.inverse[2, 2])
+    return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= CLEAR**2 * known))
 
 
 def arrest_frame(observation: Observation) -> int | None:
@@ -139,10 +135,11 @@ def arrest_frame(observation: Observation) -> int | None:
     path = observation.path()
     step_s, velocity, speed_sd = path.steps
     for i in range(BEFORE + 1, len(step_s)):
-        way = velocity[:, i - 1 - BEFORE : i - 1].sum(axis=1)
+        own = slice(i - 1 - BEFORE, i - 1)
+        way = velocity[:, own].sum(axis=1)
         going = way @ velocity / max(float(np.hypot(*way)), np.finfo(float).tiny)
-        usual = np.median(going[i - 1 - BEFORE : i - 1])
-        is_clear = usual > STOP_CLEAR * np.median(speed_sd[i - 1 - BEFORE : i - 1])
+        usual = np.median(going[own])
+        is_clear = usual > STOP_CLEAR * np.median(speed_sd[own])
         is_smeared = going[i - 1] <= STEADY * usual
         braked_m_s2 = (usual - going[i]) / (step_s[i] * (2 if is_smeared else 1))
         is_hit = braked_m_s2 > HIT_M_S2 and going[i - 2] > STEADY * usual
@@ -155,17 +152,64 @@ def goes_on(observation: Observation, last: int) -> bool:
     """Whether object 1 still moves after the frame `last`, with more than a tenth of its speed."""
     path = observation.path()
     at = int(np.searchsorted(path.frames, last))
-    before = path[max(at - STEPS, 0) : at + 1]
-    after = path[at + SMEARED : at + SMEARED + STEPS + 1]
-    if min(len(before), len(after)) < 2:
+    parts = path[max(at - STEPS, 0) : at + 1], path[at + SMEARED : at + SMEARED + STEPS + 1]
+    if min(map(len, parts)) < 2:
         return False
-    speeds = [
+    before, after = (
         np.linalg.norm(part.place_m[:, -1] - part.place_m[:, 0]) / np.ptp(part.times_s)
-        for part in (before, after)
-    ]
-    return bool(speeds[1] > GOES_ON * speeds[0])
+        for part in parts
+    )
+    return bool(after > GOES_ON * before)
 
 
-def _median(values: np.ndarray) -> np.ndarray:
+def bounce_frame(observation: Observation) -> int | None:
+    """The last frame before object 1 bounces for the first time in space; None: never.
+
+    Around every frame k a path of `PARABOLA_FRAMES` to either side is laid, which may bend once,
+
+        x(t) = x_0 + v t + a t^2 / 2 + c max(t - t_k, 0)      for each axis
+
+    and it is a bounce where the bend c is
+
+        c' S^-1 c / q        is what BOUNCE_CHANCE makes of errors alone; S is the scatter of what
+                             the path leaves, of few frames (hence an F ratio), q the bend's element
+                             of the inverse normal matrix
+        |c| > BOUNCE_SHARE |v|    drag that changes on the way, bent at its middle, is far less
+
+    S is that of the track itself, per direction: where times are not known well errors along the
+    way are several times those across, and a ball that grazes the table changes its velocity
+    across.
+    """
+    path = observation.path()
+    if len(path) < 2 * FEWEST:
+        return None
+    middles = range(FEWEST - 1, len(path) - FEWEST)
+    chance = np.array([_chance_of_bend(path, k) for k in middles])
+    bounces = stretches(chance < BOUNCE_CHANCE)
+    if not bounces:
+        return None
+    at = middles[bounces[0].start + int(np.argmin(chance[bounces[0]]))]
+    return int(path.frames[last_before(path, at)])
+
+
+def _chance_of_bend(path: PointPath, middle: int) -> float:
+    """Of so clear a bend between a frame and the next without a bounce; 1 where it is too small."""
+    part = path[max(middle - PARABOLA_FRAMES + 1, 0) : middle + PARABOLA_FRAMES + 1]
+    since = part.times_s - (path.times_s[middle] + path.times_s[middle + 1]) / 2
+    design = np.stack([np.ones_like(since), since, since**2, np.maximum(since, 0.0)], axis=1)
+    fit = least_squares(design, part.place_m.T)
+    freedom, axes = len(part) - design.shape[1], len(part.place_m)
+    bend, speed = fit.solution[3], float(np.linalg.norm(fit.solution[1] + fit.solution[3] / 2))
+    if freedom <= axes or np.linalg.norm(bend) < BOUNCE_SHARE * speed:
+        return 1.0
+    scatter = fit.left.T @ fit.left / freedom
+    scatter += np.finfo(float).eps * np.trace(scatter) * np.eye(axes)
+    squared = float(bend @ np.linalg.solve(scatter, bend) / fit.inverse[3, 3])
+    spare = freedom - axes + 1
+    return float(special.fdtrc(axes, spare, squared * spare / (freedom * axes)))
+
+
+def _medians(values: np.ndarray) -> np.ndarray:
     """Of each window of `STEPS` steps."""
-    return np.median(np.lib.stride_tricks.sliding_window_view(values, STEPS), axis=-1)
+    windows = np.lib.stride_tricks.sliding_window_view(values, STEPS, axis=-1)
+    return np.median(windows, axis=-1)

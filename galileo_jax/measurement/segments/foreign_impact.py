@@ -7,12 +7,11 @@ three frames of a hit that is of the scene only the hard one is told from that h
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.walls import distance_to_wall
-from galileo_jax.measurement.segments.blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame
-from galileo_jax.observation.observation import Observation, PointPath
+from galileo_jax.measurement.segments.blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame, jumps
+from galileo_jax.observation.observation import Observation
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other
 STEPS_ON_WAY = 9  # places between two frames at which distances are looked at
@@ -23,15 +22,10 @@ def stranger_frame(clip: Clip, observation: Observation) -> tuple[int, int] | No
     found = [
         (frame, i)
         for i in range(len(observation.names))
-        if (frame := _first(clip, observation, i)) is not None
+        for frame in (_hard(clip, observation, i), _soft(clip, observation, i))
+        if frame
     ]
-    return min(found) if found else None
-
-
-def _first(clip: Clip, observation: Observation, i: int) -> int | None:
-    """Of puck `i`; blows with a partner are passed over."""
-    found = [frame for frame in (_hard(clip, observation, i), _soft(clip, observation, i)) if frame]
-    return min(found) if found else None
+    return min(found, default=None)
 
 
 def _hard(clip: Clip, observation: Observation, i: int) -> int | None:
@@ -41,19 +35,6 @@ def _hard(clip: Clip, observation: Observation, i: int) -> int | None:
         if not _has_partner(clip, observation, i, slice(path.frames[at], path.frames[at + 2] + 1)):
             return int(path.frames[at])
     return None
-
-
-def jumps(path: PointPath, most_m_s2: float, clear: float) -> Bool[np.ndarray, " middle"]:
-    """Whether the velocity changes beyond an acceleration and noise, for each place but the ends.
-
-    Args:
-      path: of an object.
-      most_m_s2: nothing but a blow accelerates so.
-      clear: standard deviations of the change that are no noise.
-    """
-    step_s, velocity, sd = path.steps
-    change = np.linalg.norm(np.diff(velocity[:2]), axis=0)
-    return change > most_m_s2 * (step_s[1:] + step_s[:-1]) / 2 + clear * np.hypot(sd[1:], sd[:-1])
 
 
 def _soft(clip: Clip, observation: Observation, i: int) -> int | None:
@@ -73,18 +54,18 @@ def _has_partner(clip: Clip, observation: Observation, i: int, frames: slice) ->
 
     It may be so near between two of them, by half of what the puck goes from one to the next.
     """
-    place, radius = observation.position_m[:, :2, frames], _radius_m(clip, i)
+    place = observation.position_m[:, :2, frames]
+    radii = [(item.size_m or (0.0,))[0] for item in clip.objects]
     own = _on_way(place[i])
     if not np.isfinite(own).all():
         return True
-    reach = NEAR * radius + np.linalg.norm(np.diff(place[i]), axis=0).max() / 2
+    reach = NEAR * radii[i] + np.linalg.norm(np.diff(place[i]), axis=0).max() / 2
     if any(distance_to_wall(own.T, wall.ends_m).min() < reach for wall in clip.walls):
         return True
-    for j in range(len(place)):
-        apart = np.linalg.norm(_on_way(place[j]) - own, axis=0)
-        if j != i and not apart.min() > reach + NEAR * _radius_m(clip, j):
-            return True
-    return False
+    return any(
+        j != i and not np.linalg.norm(_on_way(other) - own, axis=0).min() > reach + NEAR * radii[j]
+        for j, other in enumerate(place)
+    )
 
 
 def _on_way(place: np.ndarray) -> np.ndarray:
@@ -92,7 +73,3 @@ def _on_way(place: np.ndarray) -> np.ndarray:
     frames = place.shape[1]
     between = np.linspace(0, frames - 1, (frames - 1) * (STEPS_ON_WAY - 1) + 1)
     return np.stack([np.interp(between, np.arange(frames), row) for row in place])
-
-
-def _radius_m(clip: Clip, i: int) -> float:
-    return (clip.objects[i].size_m or (0.0,))[0]

@@ -18,6 +18,7 @@ exactly the parabola of what follows tells, back to the first frame that it does
 import numpy as np
 
 from galileo_jax.measurement.segments.blow import continues
+from galileo_jax.observation.least_squares import least_squares
 from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
@@ -54,14 +55,11 @@ def let_go_frame(observation: Observation) -> int | None:
     slope, intercept = np.polyfit(times[moves], np.sqrt(gone[moves]), 1)
     if slope <= 0:
         return None
-    let_go_s = -intercept / slope
-    step_s = float(np.median(np.diff(times)))
-    if let_go_s - times[0] < max(LEAST_S, LEAST_FRAMES * step_s):
-        return None
-    if (gone[times < let_go_s - step_s] > low).any():
-        return None  # it was elsewhere before: no rest
+    let_go_s, step_s = -intercept / slope, float(np.median(np.diff(times)))
+    is_held = let_go_s - times[0] >= max(LEAST_S, LEAST_FRAMES * step_s)
+    was_elsewhere = (gone[times < let_go_s - step_s] > low).any()
     at = int(np.searchsorted(times, let_go_s + step_s))
-    return int(path.frames[at]) if at < len(path) else None
+    return int(path.frames[at]) if is_held and not was_elsewhere and at < len(path) else None
 
 
 def hand_frame(observation: Observation) -> int | None:
@@ -71,7 +69,7 @@ def hand_frame(observation: Observation) -> int | None:
         return None
     gone, length = _gone(path.place_m)
     began = _leaves(path, gone, length)
-    size = max(FEWEST, round(WINDOW_SHARE * (len(path) - began)))
+    size = _window(len(path) - began)
     if began == 0 or len(path) - began < 4 * size:
         return None  # it moves when it is first seen: whoever let it go is not in the clip
     starts = np.arange(began, len(path) - size)
@@ -85,9 +83,7 @@ def hand_frame(observation: Observation) -> int | None:
         return None
     is_held = (found < HELD * usual) | (found > PUSHED * usual)
     is_held &= (np.abs(found - usual) > CLEAR * sd) & (middle < EARLY)
-    if not is_held.any():
-        return None
-    return int(path.frames[starts[np.flatnonzero(is_held)[-1]] + size])
+    return int(path.frames[starts[is_held][-1] + size]) if is_held.any() else None
 
 
 def pushed_frame(observation: Observation) -> int | None:
@@ -100,9 +96,8 @@ def pushed_frame(observation: Observation) -> int | None:
     if len(path) < 4 * FEWEST:
         return None
     gone, length = _gone(path.place_m)
-    size = max(FEWEST, round(WINDOW_SHARE * len(path)))
-    starts = np.arange(len(path) - size + 1)
-    found, sd = _accelerations(path, gone, starts, size)
+    size = _window(len(path))
+    found, sd = _accelerations(path, gone, np.arange(len(path) - size + 1), size)
     gains = np.flatnonzero(found > CLEAR * sd)
     if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
         return None
@@ -122,7 +117,7 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
     if rest_belongs:
         gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
         path = path[_leaves(path, gone, float(gone.max())) :]
-    size, held = max(FEWEST, round(WINDOW_SHARE * len(path))), -1
+    size, held = _window(len(path)), -1
     while 3 * size <= len(path):
         held, is_clear = _last_held(path, size)
         if held >= 0 or is_clear:
@@ -136,6 +131,11 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
     return int(path.frames[first + 1]) if first else None
 
 
+def _window(frames: int) -> int:
+    """How many of the frames in motion tell an acceleration."""
+    return max(FEWEST, round(WINDOW_SHARE * frames))
+
+
 def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:
     """The first place from which on it is clearly away from where it was."""
     variance = path.variance_m2
@@ -147,7 +147,7 @@ def _last_held(path: PointPath, size: int) -> tuple[int, bool]:
     """Where the last window with a hand on begins, -1: none; and whether noise lets it show."""
     starts = np.arange(len(path) - size + 1)
     each = [_accelerations(path, one, starts, size) for one in path.place_m]
-    found, sd = np.array([one for one, _ in each]), max(one for _, one in each)
+    found, sd = np.array([one for one, _ in each]), each[0][1]
     velocity = np.gradient(path.place_m, path.times_s, axis=1)[:, starts + size // 2]
     is_later = starts >= LATER * len(starts)
     apart, weight = _beside_free(found, velocity, is_later, sd)
@@ -166,16 +166,17 @@ def _beside_free(
     be is of the size of the weight.
     """
     speed = np.linalg.norm(velocity, axis=0)
-    usual = np.median(found[:, is_later], axis=1)
-    weight, top = float(np.linalg.norm(usual)), max(float(speed[is_later].max()), 1e-30)
-    air = [-speed * velocity / top**2]
-    air += [np.stack([-velocity[1], velocity[0], *(0 * velocity[2:])]) / top]
+    usual = float(np.linalg.norm(np.median(found[:, is_later], axis=1)))
+    top = max(float(speed[is_later].max()), 1e-30)
+    drag = -speed * velocity / top**2
+    lift = np.stack([-velocity[1], velocity[0], *(0 * velocity[2:])]) / top
     axes = [np.broadcast_to(axis[:, None], velocity.shape) for axis in np.eye(len(velocity))]
-    columns = np.stack([*axes, *air], axis=-1)  # [axis, window, unknown]
-    held_fast = np.diag([*np.zeros(len(axes)), *(2 * [max(sd / max(weight, 1e-30), 1e-6)])])
-    design = np.concatenate([columns[:, is_later].reshape(-1, columns.shape[-1]), held_fast])
-    seen = np.append(found[:, is_later].reshape(-1), np.zeros(len(held_fast)))
-    solution = np.linalg.lstsq(design, seen, rcond=None)[0]
+    columns = np.stack([*axes, drag, lift], axis=-1)  # [axis, window, unknown]
+    unknowns = columns.shape[-1]
+    held_fast = np.diag([*np.zeros(len(axes)), *(2 * [max(sd / max(usual, 1e-30), 1e-6)])])
+    design = np.concatenate([columns[:, is_later].reshape(-1, unknowns), held_fast])
+    seen = np.append(found[:, is_later].reshape(-1), np.zeros(unknowns))
+    solution = least_squares(design, seen).solution
     weight = float(np.linalg.norm(solution[: len(axes)]))
     return np.linalg.norm(found - columns @ solution, axis=0), weight
 
@@ -194,8 +195,7 @@ def _accelerations(
 
 def _gone(place_m: np.ndarray) -> tuple[np.ndarray, float]:
     """How far it is from where it began, towards where it is furthest; and how far that is."""
-    began = np.median(place_m[:, :FEWEST], axis=1, keepdims=True)
-    furthest = int(np.argmax(np.hypot(*(place_m - began))))
-    length = float(np.hypot(*(place_m[:, furthest] - began[:, 0])))
-    along = (place_m[:, furthest] - began[:, 0]) / max(length, np.finfo(float).tiny)
-    return along @ (place_m - began), length
+    away = place_m - np.median(place_m[:, :FEWEST], axis=1, keepdims=True)
+    furthest = away[:, int(np.argmax(np.hypot(*away)))]
+    length = float(np.hypot(*furthest))
+    return furthest @ away / max(length, np.finfo(float).tiny), length

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.measurement.infer_sizes import distance_at_hit
+from galileo_jax.measurement.infer_ramp import distance_at_hit
 from galileo_jax.observation.observation import Observation
 
 AGREES_M, TELLS_M = 1e-3, 2.5e-3
@@ -31,20 +31,26 @@ TIPS_OVER = "tips over onto another face"
 FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
 RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
 
+Half = tuple[float, float]
+"""Of an object's length along the travel and of its height, m."""
+
 
 def ramp_end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
     """The last frame before the first of these ends, whose it is, and why; None where none is."""
-    found = [(_tip_frame(clip, observation, i), i, TIPS_OVER) for i in range(len(clip.objects))]
-    found += [
-        (_fold_frame(clip, observation, front), front - 1, FOLDS)
-        for front in range(1, len(clip.objects))
-    ]
-    found.append((_return_frame(clip, observation), 0, RETURNS))
+    from galileo_jax.model.scene.scene import extents
+
+    halves = [extents(item) if item.size_m is not None else None for item in clip.objects]
+    found = [(_return_frame(observation, halves[0]), 0, RETURNS)]
+    for i, (item, half) in enumerate(zip(clip.objects, halves, strict=True)):
+        if item.shape in TIPS and item.roll_inertia is None:
+            found.append((_tip_frame(clip, observation, i, half), i, TIPS_OVER))
+        if i:
+            found.append((_fold_frame(observation, i, halves[i - 1], half), i - 1, FOLDS))
     ends = [(frame, i, why) for frame, i, why in found if frame is not None]
     return min(ends, default=None)
 
 
-def _tip_frame(clip: Clip, observation: Observation, i: int) -> int | None:
+def _tip_frame(clip: Clip, observation: Observation, i: int, half: Half | None) -> int | None:
     """The last frame before object `i` tips over; None where it does not.
 
     A box goes on on another face then, and is no longer the body that was declared. Seen from the
@@ -60,14 +66,9 @@ def _tip_frame(clip: Clip, observation: Observation, i: int) -> int | None:
     above where it stood and above where it is soon after, so that no slope of the table is taken
     for it. What rises less rocks and falls back (`similarity/rocking_discrepancy.py`).
     """
-    from galileo_jax.model.scene.scene import extents
-
-    item = clip.objects[i]
-    if item.shape not in TIPS or item.size_m is None or item.roll_inertia is not None:
+    if half is None or clip.ramp_angle_deg is None:
         return None
-    if clip.ramp_angle_deg is None:
-        return None
-    length, height = extents(item)
+    length, height = half
     seen = observation.path(i).frames
     x, y = observation.position_m[i][:, seen]
     sd = np.sqrt(observation.covariance_m2[i, 1, 1, seen])
@@ -103,7 +104,9 @@ def _tip_frame(clip: Clip, observation: Observation, i: int) -> int | None:
     return int(seen[max(last - 1, 0)] if i else seen[last])
 
 
-def _fold_frame(clip: Clip, observation: Observation, front: int) -> int | None:
+def _fold_frame(
+    observation: Observation, front: int, rear_half: Half | None, front_half: Half | None
+) -> int | None:
     """The last frame before object `front` and the one behind it turn aside; None: they do not.
 
     To push from behind is unstable: boxes that touch turn, the one to the left, the other to the
@@ -115,27 +118,22 @@ def _fold_frame(clip: Clip, observation: Observation, front: int) -> int | None:
 
     d_hit being the distance at the hit, which is where the lines through it before and after meet.
     """
-    from galileo_jax.model.scene.scene import extents
-
-    pair = clip.objects[front - 1 : front + 1]
     hit_m = distance_at_hit(observation, front - 1)
-    if hit_m is None or any(item.size_m is None for item in pair):
+    if hit_m is None or rear_half is None or front_half is None:
         return None
     both = np.flatnonzero(observation.mask[front - 1] & observation.mask[front])
     x, variance = observation.position_m[:, 0], observation.covariance_m2[:, 0, 0]
     apart = (x[front] - x[front - 1])[both]
     sd = math.sqrt(float(np.median((variance[front] + variance[front - 1])[both])))
-    touching = min(hit_m, sum(extents(item)[0] for item in pair))
-    mean = np.convolve(apart, np.full(FOLD_FRAMES, 1 / FOLD_FRAMES), "valid")
-    closer = touching - mean
-    if not (closer > CLOSER_M + CLEAR * sd / math.sqrt(FOLD_FRAMES)).any():
-        return None
-    first = int(np.argmax(closer > CLOSER_M + CLEAR * sd / math.sqrt(FOLD_FRAMES)))
-    before = np.flatnonzero(closer[:first] < BEGINS_M)
-    return int(both[before[-1] + FOLD_FRAMES // 2]) if before.size else None
+    closer = min(hit_m, rear_half[0] + front_half[0]) - np.convolve(
+        apart, np.full(FOLD_FRAMES, 1 / FOLD_FRAMES), "valid"
+    )
+    is_closer = closer > CLOSER_M + CLEAR * sd / math.sqrt(FOLD_FRAMES)
+    before = np.flatnonzero(closer[: int(np.argmax(is_closer))] < BEGINS_M)
+    return int(both[before[-1] + FOLD_FRAMES // 2]) if is_closer.any() and before.size else None
 
 
-def _return_frame(clip: Clip, observation: Observation) -> int | None:
+def _return_frame(observation: Observation, half: Half | None) -> int | None:
     """The last frame before object 1, which came down, comes back to the foot; None: it does not.
 
     A spring pulls it, or a heavy partner throws it back. Where its rear edge meets the foot it is
@@ -143,18 +141,11 @@ def _return_frame(clip: Clip, observation: Observation) -> int | None:
     is not of the scene. It has come back if it goes backwards with its centre less than half its
     length and MARGIN past the foot, after it was BEYOND farther than that.
     """
-    from galileo_jax.model.scene.scene import extents
-
-    item, seen = clip.objects[0], np.flatnonzero(observation.mask[0])
-    if item.size_m is None or not seen.size:
+    seen = np.flatnonzero(observation.mask[0])
+    if half is None or not seen.size:
         return None
     x = observation.position_m[0, 0, seen]
     sd = np.sqrt(np.median(observation.covariance_m2[0, 0, 0, seen]))
-    near = extents(item)[0] + MARGIN_M
-    farthest = np.maximum.accumulate(x)
-    came_back = farthest - x > BEYOND_M + SURE * sd
-    returns = (x[0] < 0.0) & came_back & (x < near)
-    if not returns.any():
-        return None
-    first = int(np.argmax(returns))
-    return int(seen[first - 1]) if first else None
+    came_back = np.maximum.accumulate(x) - x > BEYOND_M + SURE * sd
+    returns = (x[0] < 0.0) & came_back & (x < half[0] + MARGIN_M)
+    return int(seen[int(np.argmax(returns)) - 1]) if returns.any() else None

@@ -22,62 +22,54 @@ def placed_frames(observation: Observation) -> tuple[int | None, int | None]:
     there. So between two rests there is one motion, and whoever made it, the run is the one that
     comes down furthest. Before the rest from which it begins the object was carried, and after the
     rest in which it ends it is carried again. Either frame is in the middle of a rest.
+    """
+    path = observation.path()
+    place_m = path.place_m
+    if len(path) < 2 * FEWEST or not (rests := stretches(_is_still(path))):
+        return None, None
+    # Between rests, and before the first and after the last of them.
+    ends = [0, *(edge for rest in rests for edge in (rest.start, rest.stop - 1)), len(path) - 1]
+    runs = list(zip(ends[::2], ends[1::2], strict=True))
+    ways = np.array([place_m[:, last] - place_m[:, first] for first, last in runs])
+    run = int(np.argmin(ways[:, 1]))
+    if ways[run, 1] >= 0:
+        return None, None
+
+    def carried(part: slice, rest: slice) -> int | None:
+        """The middle of a rest beside which a part of the track was carried about."""
+        home = np.median(place_m[:, rest], axis=1, keepdims=True)
+        away = np.hypot(*(place_m[:, part] - home)).max(initial=0.0)
+        middle = int(path.frames[(rest.start + rest.stop) // 2])
+        return middle if away > CARRIED * np.hypot(*ways[run]) else None
+
+    before, after = rests[run - 1] if run else None, rests[run] if run < len(rests) else None
+    return (
+        None if before is None else carried(slice(before.start), before),
+        None if after is None else carried(slice(after.stop, None), after),
+    )
+
+
+def _is_still(path: PointPath) -> np.ndarray:
+    """Which of the places lie in a window at rest, `[place]`.
 
     A window of STILL_S is a rest if the mean places of its thirds agree within STILL of the whole
     way, or within CLEAR standard deviations of such a mean: what turns back is further away at
     either end.
     """
-    path = observation.path()
-    place_m = path.place_m
-    if len(path) < 2 * FEWEST:
-        return None, None
-    size = max(FEWEST, round(STILL_S / float(np.median(np.diff(path.times_s)))))
-    if len(path) < size:
-        return None, None
-    rests = stretches(_is_still(path, size))
-    if not rests:
-        return None, None
-    # Between rests, and before the first and after the last of them.
-    ends = [0, *(edge for rest in rests for edge in (rest.start, rest.stop - 1)), len(path) - 1]
-    runs = list(zip(ends[::2], ends[1::2], strict=True))
-    falls = [place_m[1, first] - place_m[1, last] for first, last in runs]
-    run = int(np.argmax(falls))
-    way = float(np.hypot(*(place_m[:, runs[run][1]] - place_m[:, runs[run][0]])))
-    if falls[run] <= 0:
-        return None, None
-
-    def is_carried(part: slice, rest: slice) -> bool:
-        home = np.median(place_m[:, rest], axis=1, keepdims=True)
-        away = np.hypot(*(place_m[:, part] - home))
-        return bool(away.size and away.max() > CARRIED * way)
-
-    first = last = None
-    if run > 0 and is_carried(slice(None, rests[run - 1].start), rests[run - 1]):
-        first = int(path.frames[_middle(rests[run - 1])])
-    if run < len(rests) and is_carried(slice(rests[run].stop, None), rests[run]):
-        last = int(path.frames[_middle(rests[run])])
-    return first, last
-
-
-def _is_still(path: PointPath, size: int) -> np.ndarray:
-    """Which of the places lie in a window at rest, `[place]`."""
-    place, third = path.place_m, size // 3
-    variance = float(np.median(path.variance_m2))
+    place, size = path.place_m, round(STILL_S / float(np.median(np.diff(path.times_s))))
+    third = max(FEWEST, size) // 3
+    covered = np.zeros(len(path), bool)
+    if len(path) < max(FEWEST, size):
+        return covered
     extent = float(np.hypot(*np.ptp(place, axis=1)))
-    most = max(STILL * extent, CLEAR * np.sqrt(2 * variance / third))
+    most = max(STILL * extent, CLEAR * np.sqrt(2 * float(np.median(path.variance_m2)) / third))
     means = np.lib.stride_tricks.sliding_window_view(place, third, axis=1).mean(axis=-1)
-    count = place.shape[1] - 3 * third + 1
+    count = len(path) - 3 * third + 1
     parts = [means[:, k * third : k * third + count] for k in range(3)]
     apart = [np.hypot(*(parts[i] - parts[j])) for i, j in ((0, 1), (1, 2), (0, 2))]
-    still = np.max(apart, axis=0) < most
-    covered = np.zeros(len(path), bool)
-    for shift in range(3 * third):
-        covered[shift : shift + count] |= still
+    for first in np.flatnonzero(np.max(apart, axis=0) < most):
+        covered[first : first + 3 * third] = True
     return covered
-
-
-def _middle(rest: slice) -> int:
-    return (rest.start + rest.stop) // 2
 
 
 def rest_frame(observation: Observation, radius_m: float) -> int | None:
@@ -90,9 +82,7 @@ def rest_frame(observation: Observation, radius_m: float) -> int | None:
       radius_m: of the smallest object.
     """
     last = []
-    for path in map(observation.path, range(len(observation.names))):
-        if not len(path):
-            continue
+    for path in filter(len, map(observation.path, range(len(observation.names)))):
         end = path.place_m[:2, -max(len(path) // 8, 1) :].mean(axis=1, keepdims=True)
         away = np.linalg.norm(path.place_m[:2] - end, axis=0) > NEAR_END * radius_m
         last.append(path.frames[np.flatnonzero(away)[-1]] if away.any() else path.frames[0])
@@ -100,8 +90,7 @@ def rest_frame(observation: Observation, radius_m: float) -> int | None:
         return None
     times = observation.times_s
     end = int(np.searchsorted(times, times[max(last)] + REST_S))
-    seen = np.flatnonzero(observation.mask.any(axis=0))
-    return end if end < seen[-1] else None
+    return end if observation.mask[:, end + 1 :].any() else None
 
 
 def standstill_frame(observation: Observation) -> int | None:
@@ -123,8 +112,6 @@ def standstill_frame(observation: Observation) -> int | None:
     before = min(max(last - ENOUGH, 0), int(np.searchsorted(times, times[last] - SOON_S / 2)))
     if last == before:
         return None
-    way = float(np.linalg.norm(place[:, last] - place[:, before]))
-    speed = way / (times[last] - times[before])
+    speed = np.linalg.norm(place[:, last] - place[:, before]) / (times[last] - times[before])
     width = float(np.linalg.norm(np.ptp(place, axis=1)))
-    goes_on = speed * SOON_S > max(GOES_ON * width, still)
-    return int(path.frames[last - 1]) if goes_on else None
+    return int(path.frames[last - 1]) if speed * SOON_S > max(GOES_ON * width, still) else None

@@ -29,23 +29,10 @@ from jaxtyping import Int
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.measurement.segments.blow import (
-    SMEARED_FRAMES,
-    arrest_frame,
-    blow_frame,
-    goes_on,
-)
-from galileo_jax.measurement.segments.bounce import bounce_frame
+from galileo_jax.measurement.segments import blow, handling, rest
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
-from galileo_jax.measurement.segments.handling import (
-    hand_frame,
-    let_go_frame,
-    pushed_frame,
-    thrown_frame,
-)
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
 from galileo_jax.measurement.segments.rate_change import rate_change
-from galileo_jax.measurement.segments.rest import placed_frames, rest_frame, standstill_frame
 from galileo_jax.measurement.segments.track_failure import Astray, find_astray
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
@@ -66,6 +53,8 @@ HELD = "is moved by a hand before that: it accelerates differently from later"
 PUSHED = "is pushed by a hand before that: it gains speed on a level table"
 
 SWINGS = ("pendulum", "spring", "liquid")
+EXPOSED_FRAMES = 1
+"""Of a video: the hit falls into an exposure, whose frame shows neither before nor after."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +126,12 @@ class Segments:
         return used.between(slice(int(np.flatnonzero(seen.any(axis=0))[-1]) + 1))
 
 
+def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
+    """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
+    found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
+    return {"cuts": found} if found else {}
+
+
 def segment(clip: Clip, observation: Observation, track: Track | None = None) -> Segments:
     """The segments of a track.
 
@@ -145,21 +140,15 @@ def segment(clip: Clip, observation: Observation, track: Track | None = None) ->
       observation: of all the clip.
       track: the same in pixels; None: it was tracked elsewhere, and nothing has gone astray.
     """
-    scenario = SCENARIOS[clip.scenario]
+    scenario, whole = SCENARIOS[clip.scenario], _Kept(observation)
     if scenario.is_level:
-        kept = _of_pucks(clip, _Kept(observation))
+        kept = whole.end_with(_end_of_pucks(clip, observation))
     elif scenario.has_table:
-        kept = _Kept(observation).end_with(ramp_end(clip, observation))
+        kept = whole.end_with(ramp_end(clip, observation))
     else:
-        kept = _of_one(clip, _Kept(observation))
+        kept = _of_one(clip, whole)
     astray = () if track is None else find_astray(clip, kept.observation, track)
     return Segments(tuple(cut for cut in (kept.begin, kept.end) if cut is not None), astray)
-
-
-def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
-    """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
-    found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
-    return {"cuts": found} if found else {}
 
 
 @dataclass(frozen=True)
@@ -174,87 +163,73 @@ class _Kept:
         """Without what is before a frame; None: nothing is left out."""
         if frame is None:
             return self
-        rest = self.observation.without(slice(None, frame))
-        time_s = float(rest.times_s[frame])
-        return replace(self, observation=rest, begin=Cut(rest.names[0], time_s, "before", why))
+        cut = Cut(self.observation.names[0], float(self.observation.times_s[frame]), "before", why)
+        return replace(self, observation=self.observation.without(slice(frame)), begin=cut)
 
     def end_with(self, found: tuple[int, int, str] | None) -> "_Kept":
         """Without what is after a frame that some object tells, and why; None: all stays."""
         if found is None:
             return self
         frame, i, why = found
-        rest = self.observation.without(slice(frame + 1, None))
-        time_s = float(rest.times_s[frame])
-        return replace(self, observation=rest, end=Cut(rest.names[i], time_s, "after", why))
-
-
-def is_board(clip: Clip) -> bool:
-    """Whether it shows a board without a table."""
-    scenario = SCENARIOS[clip.scenario]
-    return scenario.has_ramp and not scenario.has_table
+        cut = Cut(self.observation.names[i], float(self.observation.times_s[frame]), "after", why)
+        return replace(self, observation=self.observation.without(slice(frame + 1, None)), end=cut)
 
 
 def _of_one(clip: Clip, kept: _Kept) -> _Kept:
-    """Of one object that slides, falls, flies or swings."""
+    """Of one object that slides down a board, falls, flies or swings."""
     scenario = SCENARIOS[clip.scenario]
-    is_let_go = is_board(clip) and not clip.starts_moving and "start_velocity" not in scenario.laws
-    if is_let_go:
-        first, last = placed_frames(kept.observation)
-        kept = kept.begin_at(first, PLACED)
-        kept = kept if last is None else kept.end_with((last, 0, TAKEN))
-    if clip.scenario in SWINGS:
-        kept = kept.begin_at(let_go_frame(kept.observation), IS_HELD)
-    kept = kept.end_with(_end(clip, kept.observation))
     is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
-    if is_board(clip) and scenario.angle_deg == 0:
-        return kept.begin_at(pushed_frame(kept.observation), PUSHED)
+    is_let_go = (
+        scenario.has_ramp and not clip.starts_moving and "start_velocity" not in scenario.laws
+    )
+    if is_let_go:
+        first, last = rest.placed_frames(kept.observation)
+        kept = kept.begin_at(first, PLACED).end_with(None if last is None else (last, 0, TAKEN))
+    if clip.scenario in SWINGS:
+        kept = kept.begin_at(handling.let_go_frame(kept.observation), IS_HELD)
+    kept = kept.end_with(_end_of_one(clip, kept.observation))
+    if scenario.has_ramp and scenario.angle_deg == 0:
+        return kept.begin_at(handling.pushed_frame(kept.observation), PUSHED)
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
-        return kept.begin_at(thrown_frame(kept.observation, rest_belongs), HELD)
-    return kept.begin_at(hand_frame(kept.observation), HELD) if is_let_go else kept
+        return kept.begin_at(handling.thrown_frame(kept.observation, rest_belongs), HELD)
+    return kept.begin_at(handling.hand_frame(kept.observation), HELD) if is_let_go else kept
 
 
-def _end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
+def _end_of_one(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
     """The last frame before the motion of one object ends, 0, and why; None where it goes on."""
-    ends: list[tuple[int | None, str]] = []
+    is_board, is_swing = SCENARIOS[clip.scenario].has_ramp, clip.scenario in SWINGS
     is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
-    is_in_space = observation.position_m.shape[1] == 3
+    ends: list[tuple[int | None, str]] = []
     if clip.scenario == "toss" and clip.track is not None:
         poses = read_poses_csv(clip.track, clip.track_up)
         ends.append((last_free_frame(poses, clip.objects[0].size_m), LANDED))
-    if is_board(clip) or (is_free and clip.scenario == "fall"):
-        ends.append((arrest_frame(observation), STOPPED))
-    if clip.scenario in SWINGS:
-        ends.append((standstill_frame(observation), STOPPED))
-    if is_board(clip) or is_free or clip.scenario in SWINGS:
-        is_flight = clip.scenario == "flight" and is_in_space
-        struck = bounce_frame(observation) if is_flight else blow_frame(observation)
-        ends.append((struck, STRUCK))
-    if (is_board(clip) or is_free) and (change := rate_change(observation)) is not None:
-        ends.append((change.last, CHANGES_RATE.format(change.factor)))
+    if is_board or (is_free and clip.scenario == "fall"):
+        ends.append((blow.arrest_frame(observation), STOPPED))
+    if is_swing:
+        ends.append((rest.standstill_frame(observation), STOPPED))
+    if is_board or is_free or is_swing:
+        is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
+        find = blow.bounce_frame if is_in_space else blow.blow_frame
+        ends.append((find(observation), STRUCK))
+    if (is_board or is_free) and (change := rate_change(observation)) is not None:
+        ends.append((change[0], CHANGES_RATE.format(change[1])))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:
         return None
     last, why = min(found)
-    if why == STOPPED and goes_on(observation, last):
+    if why == STOPPED and blow.goes_on(observation, last):
         why = STRUCK
-    # Of a video: the hit falls into an exposure, whose frame shows neither.
-    return last - (SMEARED_FRAMES if observation.is_tracked_here else 0), 0, why
+    return last - (EXPOSED_FRAMES if observation.is_tracked_here else 0), 0, why
 
 
-def _of_pucks(clip: Clip, kept: _Kept) -> _Kept:
-    """To the first blow by a stranger, or to when all that is seen has come to rest.
+def _end_of_pucks(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
+    """The first blow by a stranger, or when all that is seen has come to rest.
 
     Of a film, tracks that leap are looked at by themselves: they may be of something else.
     """
-    observation = kept.observation
-    if (
-        not observation.is_tracked_here
-        and (struck := stranger_frame(clip, observation)) is not None
-    ):
-        return kept.end_with((*struck, STRUCK))
+    if not observation.is_tracked_here and (struck := stranger_frame(clip, observation)):
+        return *struck, STRUCK
     radii = [item.size_m[0] for item in clip.objects if item.size_m is not None]
-    last = rest_frame(observation, min(radii)) if radii else None
-    if last is None:
-        return kept
-    return kept.end_with((last, int(np.argmax(observation.mask[:, last])), RESTS))
+    last = rest.rest_frame(observation, min(radii)) if radii else None
+    return None if last is None else (last, int(np.argmax(observation.mask[:, last])), RESTS)

@@ -34,6 +34,45 @@ class StartSpeed(NamedTuple):
     sd_m_s: float
 
 
+def start_speed(observation: Observation) -> StartSpeed | None:
+    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
+    early = _first_half(observation)
+    if early is None:
+        return None
+    powers = np.vander(early.times_s, TERMS, increasing=True)
+    moving, moves_cost, spread = early.least_squares(powers)
+    size = early.scatter(moves_cost)
+    sd_m_s = math.sqrt(size * spread[1, 1])
+    in_a_step = max(2 * float(moving[2]), 0.0) * float(np.median(np.diff(early.times_s)))
+    if moving[1] - CLEAR * sd_m_s < in_a_step:
+        return None
+    better = early.let_go()[0] - moves_cost
+    return StartSpeed(early.sign * moving[1], sd_m_s) if better > CLEAR**2 * size else None
+
+
+def rest_s(observation: Observation) -> float | None:
+    """How long object 1 rests where it is first seen, s; None where it is let go at once, or moves.
+
+    It rests if a release that late is likelier than one in the first frame by `CLEAR` standard
+    deviations.
+    """
+    early = _first_half(observation)
+    if early is None:
+        return None
+    cost, release_s = early.let_go()
+    better = early.release_cost(0.0) - cost
+    is_later = release_s > 1.5 * float(np.median(np.diff(early.times_s)))
+    return release_s if is_later and better > CLEAR**2 * early.scatter(cost) else None
+
+
+def on_ramp(observation: Observation) -> Observation:
+    """The observation with object 1 on the ramp alone, above where its front meets the table."""
+    mask, x_m = observation.mask.copy(), observation.position_m[0, 0]
+    first = int(np.argmax(mask[0]))
+    mask[0] &= x_m < NEAR_FOOT * min(float(x_m[first]), 0.0)
+    return replace(observation, mask=mask)
+
+
 class _Way(NamedTuple):
     """The first half of a way: times from the first place seen, s, `[place]`, metres, and sds."""
 
@@ -41,6 +80,33 @@ class _Way(NamedTuple):
     way_m: np.ndarray
     sd_m: np.ndarray
     sign: float  # -1: it first goes against the way of all
+
+    def least_squares(self, design: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+        """The solution, the sum of its squared errors in units of their sd, and its covariance."""
+        white = design / self.sd_m[:, None]
+        inverse = np.linalg.pinv(white)
+        solution = inverse @ (self.way_m / self.sd_m)
+        cost = float(np.sum((self.way_m / self.sd_m - white @ solution) ** 2))
+        return solution, cost, inverse @ inverse.T
+
+    def scatter(self, cost: float) -> float:
+        """The variance of errors over the stated one, at least 1."""
+        return max(1.0, cost / max(len(self.times_s) - TERMS, 1))
+
+    def release_cost(self, release_s: float) -> float:
+        """The least sum of squared errors of a release from rest at an instant."""
+        powers = np.vander(np.maximum(self.times_s - release_s, 0.0), TERMS, increasing=True)
+        return self.least_squares(np.delete(powers, 1, axis=1))[1]
+
+    def let_go(self) -> tuple[float, float]:
+        """The least of these in the clip, and its instant, s."""
+        grid = np.linspace(self.times_s[0], self.times_s[-1], RELEASES)
+        costs = [self.release_cost(release_s) for release_s in grid]
+        at = int(np.argmin(costs))
+        bounds = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, RELEASES - 1)])
+        found = minimize_scalar(self.release_cost, bounds=bounds, method="bounded")
+        between = cast(OptimizeResult, found)
+        return min((costs[at], float(grid[at])), (float(between.fun), float(between.x)))
 
 
 def _first_half(observation: Observation) -> _Way | None:
@@ -62,76 +128,3 @@ def _first_half(observation: Observation) -> _Way | None:
     early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way[end]))))
     times = observation.times_s[seen] - observation.times_s[seen[0]]
     return _Way(times[early], way[early], sd[early], sign)
-
-
-def start_speed(observation: Observation) -> StartSpeed | None:
-    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
-    early = _first_half(observation)
-    if early is None:
-        return None
-    times, way, sd, sign = early
-    moving, moves_cost, spread = _least_squares(np.vander(times, TERMS, increasing=True), way, sd)
-    size = max(1.0, moves_cost / max(len(times) - TERMS, 1))
-    found = StartSpeed(float(moving[1]), math.sqrt(size * spread[1, 1]))
-    in_a_step = max(2 * float(moving[2]), 0.0) * float(np.median(np.diff(times)))
-    if found.mean_m_s - CLEAR * found.sd_m_s < in_a_step:
-        return None
-    better = _let_go(times, way, sd)[0] - moves_cost
-    found = found._replace(mean_m_s=sign * found.mean_m_s)
-    return found if better > CLEAR**2 * size else None
-
-
-def rest_s(observation: Observation) -> float | None:
-    """How long object 1 rests where it is first seen, s; None where it is let go at once, or moves.
-
-    It rests if a release that late is likelier than one in the first frame by `CLEAR` standard
-    deviations.
-    """
-    early = _first_half(observation)
-    if early is None:
-        return None
-    times, way, sd, _ = early
-    cost, release_s = _let_go(times, way, sd)
-    better = _least_squares(_since(times, 0.0), way, sd)[1] - cost
-    size = max(1.0, cost / max(len(times) - TERMS, 1))
-    is_later = release_s > 1.5 * float(np.median(np.diff(times)))
-    return release_s if is_later and better > CLEAR**2 * size else None
-
-
-def on_ramp(observation: Observation) -> Observation:
-    """The observation with object 1 on the ramp alone, above where its front meets the table."""
-    mask, x_m = observation.mask.copy(), observation.position_m[0, 0]
-    first = int(np.argmax(mask[0]))
-    mask[0] &= x_m < NEAR_FOOT * min(float(x_m[first]), 0.0)
-    return replace(observation, mask=mask)
-
-
-def _since(times_s: np.ndarray, release_s: float) -> np.ndarray:
-    """Powers of the time since a release, without the first, `[place, term]`."""
-    after = np.maximum(times_s - release_s, 0.0)
-    return np.delete(np.vander(after, TERMS, increasing=True), 1, axis=1)
-
-
-def _let_go(times_s: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray) -> tuple[float, float]:
-    """The least sum of squared errors of a release from rest in the clip, and its instant, s."""
-
-    def cost(release_s: float) -> float:
-        return _least_squares(_since(times_s, release_s), way_m, sd_m)[1]
-
-    grid = np.linspace(times_s[0], times_s[-1], RELEASES)
-    costs = [cost(release_s) for release_s in grid]
-    at = int(np.argmin(costs))
-    bounds = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, RELEASES - 1)])
-    between = cast(OptimizeResult, minimize_scalar(cost, bounds=bounds, method="bounded"))
-    return min((costs[at], float(grid[at])), (float(between.fun), float(between.x)))
-
-
-def _least_squares(
-    design: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray
-) -> tuple[np.ndarray, float, np.ndarray]:
-    """The solution, the sum of its squared errors in units of their sd, and its covariance."""
-    white = design / sd_m[:, None]
-    inverse = np.linalg.pinv(white)
-    solution = inverse @ (way_m / sd_m)
-    cost = float(np.sum((way_m / sd_m - white @ solution) ** 2))
-    return solution, cost, inverse @ inverse.T

@@ -13,33 +13,28 @@ the fit tells from it.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.walls import distance_to_wall
-from galileo_jax.measurement.segments.foreign_impact import jumps
+from galileo_jax.measurement.segments.blow import jumps
+from galileo_jax.measurement.segments.foreign_impact import STEPS_ON_WAY
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
-FEWEST_FRAMES = 3
-"""In which a change of speed can be seen."""
-BLOW_M_S2 = 15.0
-"""Half as much again as g: what slides is braked and drawn by less than g."""
-CLEAR = 5.0
-"""Standard deviations of a change of speed that are no noise."""
+FEWEST_FRAMES = 3  # in which a change of speed can be seen
+BLOW_M_S2 = 15.0  # half as much again as g: what slides is braked and drawn by less than g
+CLEAR = 5.0  # standard deviations of a change of speed that are no noise
 NEAR = 1.5
 """Objects whose centres are within this share of their mean size may hit each other; what is
 within this share of its size from the foot turns there."""
-UNKNOWN_M = 0.06
-"""The size of an object that nobody measured."""
+UNKNOWN_M = 0.06  # the size of an object that nobody measured
 LOST_FRAMES = 10
 """An object that is hidden for less is not lost, and one that is outside by then has left."""
-LAST_FRAMES = 5
-"""Before it is seen no more, tell where an object goes."""
-STEPS_ON_WAY = 9
-"""Places on a way of two frames at which a puck is compared with the others."""
+LAST_FRAMES = 5  # before it is seen no more, tell where an object goes
 APART = 0.8
 """Pucks lie side by side: their centres are never within this share of the sum of their radii."""
 
@@ -78,26 +73,21 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         seen = np.flatnonzero(observation.mask[i])
         if not seen.size:
             continue
-        last = int(seen[-1])
+        frame, last, is_left_out = None, int(seen[-1]), SCENARIOS[clip.scenario].is_level
         if (shared := _shared(clip, observation, i)) is not None:
             frame, other = shared
             why = f"it is then in the same place as {other}; both are left out from there on"
-            found.append(Astray(name, float(observation.times_s[frame]), why, True))
-            continue
-        if (frame := _leapt(clip, observation, i)) is not None:
+        elif (frame := _leapt(clip, observation, i)) is not None:
             why = "its velocity jumps although it hits nothing: something else is tracked there"
-            if SCENARIOS[clip.scenario].is_level:
+            if is_left_out:
+                # Where it is lost soon after, what led there was no longer the puck, either.
                 why += ", or the puck was struck by something that is not in the scene"
-            # Where it is lost soon after, what led there was no longer the puck, either.
-            is_left_out = SCENARIOS[clip.scenario].is_level
+                why += "; it is left out from there on"
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
-            frame, why = last + 1, "nothing there looks like it; the rest is left out"
-            is_left_out = False  # nothing follows
-        else:
-            continue
-        if is_left_out:
-            why += "; it is left out from there on"
-        found.append(Astray(name, float(observation.times_s[frame]), why, is_left_out))
+            frame, is_left_out = last + 1, False  # nothing follows
+            why = "nothing there looks like it; the rest is left out"
+        if frame is not None:
+            found.append(Astray(name, float(observation.times_s[frame]), why, is_left_out))
     return tuple(found)
 
 
@@ -106,34 +96,30 @@ def longest_absence(observation: Observation) -> tuple[str, float, float] | None
 
     None where none is away for more than a few frames.
     """
-    found = None
-    for name, mask in zip(observation.names, observation.mask, strict=True):
-        seen = np.flatnonzero(mask)
-        gaps = np.diff(seen)
-        if gaps.size and gaps.max() > max(LOST_FRAMES, found[0] if found else 0):
-            at = int(np.argmax(gaps))
-            found = (gaps[at], name, seen[at] + 1, seen[at + 1])
-    if found is None:
+    gaps = [
+        (back - gone, name, gone, back)
+        for name, mask in zip(observation.names, observation.mask, strict=True)
+        for seen in [np.flatnonzero(mask)]
+        for gone, back in pairwise(seen)
+    ]
+    length, name, gone, back = max(gaps, key=lambda gap: gap[0], default=(0, "", 0, 0))
+    if length <= LOST_FRAMES:
         return None
-    _, name, gone, back = found
-    return name, float(observation.times_s[gone]), float(observation.times_s[back])
+    return name, float(observation.times_s[gone + 1]), float(observation.times_s[back])
 
 
 def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | None:
     """The first frame in which puck `i` is where another one is, and which; None: in none."""
-    if not SCENARIOS[clip.scenario].is_level:
-        return None
-    place, found = observation.position_m[:, :2], None
+    own, place, found = clip.objects[i], observation.position_m[:, :2], []
     for j, other in enumerate(clip.objects):
-        both = observation.mask[i] & observation.mask[j]
-        sizes = clip.objects[i].size_m, other.size_m
-        if j == i or not both.any() or sizes[0] is None or sizes[1] is None:
+        if j == i or own.size_m is None or other.size_m is None:
             continue
+        both = observation.mask[i] & observation.mask[j]
         apart = np.where(both, np.linalg.norm(place[j] - place[i], axis=0), np.inf)
-        frames = np.flatnonzero(apart < APART * (sizes[0][0] + sizes[1][0]))
-        if frames.size and (found is None or frames[0] < found[0]):
-            found = int(frames[0]), other.name
-    return found
+        frames = np.flatnonzero(apart < APART * (own.size_m[0] + other.size_m[0]))
+        found += [(int(frame), other.name) for frame in frames[:1]]
+    is_level = SCENARIOS[clip.scenario].is_level
+    return min(found, key=lambda one: one[0], default=None) if is_level else None
 
 
 def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
@@ -179,9 +165,9 @@ def _may_meet(
     size = _size_m(clip.objects[i])
     if SCENARIOS[clip.scenario].has_table and abs(places_m[0]).min() < NEAR * size + reach_m:
         return True
-    for wall in clip.walls:
-        if distance_to_wall(places_m.T, wall.ends_m).min() < NEAR * size / 2 + reach_m:
-            return True
+    to_walls = (distance_to_wall(places_m.T, wall.ends_m).min() for wall in clip.walls)
+    if any(away < NEAR * size / 2 + reach_m for away in to_walls):
+        return True
     for j, other in enumerate(clip.objects):
         there = observation.position_m[j, :2][:, frames]
         apart = np.linalg.norm(places_m[:, :, None] - there[:, None, :], axis=0)

@@ -1,0 +1,249 @@
+"""What nobody measured of a ramp, from the paths of the objects on it: slope, foot and sizes.
+
+    slope         direction of the path = principal axis of the points seen on the ramp
+    foot          the lines of the path before and after it meet at
+                  foot + (h tan(a/2), h),   a the angle between them
+    half height   of a centre above the table, or above the ramp: h
+    half lengths  their sum is the distance of the centres when objects hit
+
+A point fixed to a sliding object stays at one distance from the surface, so its path is parallel
+to the ramp whatever point it is. The picture's vertical is taken for gravity's. Sizes enter the
+model of a ramp that ends on a table only.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.clip.fields import MAX_ANGLE_SD_DEG, MAX_SIZE_M, MIN_RAMP_ANGLE_DEG, MIN_SIZE_M
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.observation.least_squares import Line, line_through
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
+
+LEVEL_SD_DEG = 0.5
+"""How level a camera stands on a tripod, and how straight a lens draws: the error that the points'
+own scatter does not show."""
+MAX_SCATTER_SD_DEG = 2.0
+"""A path that tells its slope no better than this does not tell it."""
+UPPER_SHARE = 0.75
+"""Of the way down to the table; further down the object's front is on the table already."""
+MIN_POINTS = 5
+"""On a line, or on either side of a bend."""
+MIN_BEND_DEG = 4.0
+"""A path that bends by less shows no foot."""
+BEGIN_SHARE, LEAST_BEND = 0.5, 0.01
+"""Of the way: its begin; by how many rad, at least, a valley's slope changes there."""
+SIZE_SD_M = 0.003
+"""A marked point is the centre within this, and a height or a distance of centres no better."""
+NUM_BESIDE = 3
+"""Frames on either side of a hit through which the distance's two lines are laid."""
+CLEARLY = 5.0
+"""Standard deviations by which an object must move to have been hit."""
+
+
+@dataclass(frozen=True)
+class Slope:
+    """The slope of a ramp, from the picture's horizontal, downhill positive, and its sd."""
+
+    angle_deg: float
+    sd_deg: float
+
+
+def infer_slope(clip: Clip, observation: Observation) -> Slope:
+    """The slope of the way that the first object takes down the ramp.
+
+    Raises:
+      InputError: it hardly moves on the ramp, against the declared direction, or on the level.
+    """
+    name = observation.names[0]
+    points = observation.position_m[0][:, observation.mask[0]]
+    has_foot = SCENARIOS[clip.scenario].has_table and points.size > 0
+    if has_foot:
+        points = points[:, points[0] < (1 - UPPER_SHARE) * min(points[0, 0], 0.0)]
+
+    def refused(why: str) -> InputError:
+        return InputError(
+            f"{clip.path}: ramp_angle_deg: null, and {name}{why}; "
+            "give the angle in degrees, or `galileo label --ramp X1 Y1 X2 Y2`"
+        )
+
+    if points.shape[1] < MIN_POINTS:
+        where = " left of origin_px, the ramp's foot" if has_foot else ""
+        raise refused(
+            f" is seen in {points.shape[1]} frames{where}; too few to determine the slope"
+        )
+    line = line_through(points)  # where a board is curved, what goes down may come back
+    covariance = observation.covariance_m2[0][:, :, observation.mask[0]]
+    noise_m = math.sqrt(float(np.median(np.trace(covariance))) / 2)
+    scatter_m = max(math.sqrt(line.spread[0] / (points.shape[1] - 2)), noise_m)
+    sd_deg = math.degrees(scatter_m / math.sqrt(max(line.spread[1], 1e-30)))
+    if sd_deg > MAX_SCATTER_SD_DEG:
+        unit = "m" if clip.is_scale_known else "of the picture's units"
+        raise refused(
+            f" moves by only {float(np.ptp(line.along @ points)):.3g} {unit} on the ramp, "
+            "too little to determine the slope"
+        )
+    if line.along[0] < 0:
+        if clip.is_own_track:
+            raise InputError(
+                f"{clip.path}: track: {name}'s x decreases; x along the travel expected; turn the "
+                "sign of the csv's x columns"
+            )
+        other = "left" if clip.direction == "right" else "right"
+        raise InputError(
+            f"{clip.path}: direction: {clip.direction}, but {name} moves to the {other}; "
+            f"write direction: {other}"
+        )
+    angle_deg = falls_deg(line)
+    if angle_deg < MIN_RAMP_ANGLE_DEG:
+        # A valley: what rolls down into it comes to rest as high as it began.
+        angle_deg = max(angle_deg, _at_start_deg(points, line))
+    if not MIN_RAMP_ANGLE_DEG <= angle_deg < 90:
+        raise refused(f"'s path falls by {angle_deg:.1f} degrees: no ramp")
+    sd_deg = min(math.hypot(sd_deg, LEVEL_SD_DEG), MAX_ANGLE_SD_DEG)
+    return Slope(round(angle_deg, 3), round(sd_deg, 3))
+
+
+def falls_deg(line: Line) -> float:
+    """How steeply a line falls in the direction of the travel."""
+    return math.degrees(math.atan2(-line.along[1], line.along[0]))
+
+
+def _at_start_deg(points: np.ndarray, line: Line) -> float:
+    """The slope of the first part of a way into a valley, of a parabola through it; else -90."""
+    gone = points - points[:, :1]
+    way = line.along @ gone
+    first = (way < BEGIN_SHARE * way.max()) & (np.arange(len(way)) <= int(np.argmax(way)))
+    if first.sum() < MIN_POINTS or np.ptp(way[first]) <= 0:
+        return -90.0
+    bend, slope, _ = np.polyfit(gone[0, first], gone[1, first], 2)
+    is_valley = bend * np.ptp(gone[0, first]) > LEAST_BEND
+    return math.degrees(math.atan(-slope)) if is_valley else -90.0
+
+
+def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
+    """Where the ramp meets the table, `[2]`, m, in the observation's axes.
+
+    Args:
+      clip: with the size of its first object.
+      observation: of any origin.
+
+    Raises:
+      InputError: the size is unknown, or the path does not bend.
+    """
+    from galileo_jax.model.scene.scene import extents
+
+    first = clip.objects[0]
+    remedy = "set it with `galileo label --origin X Y`"
+    if first.size_m is None:
+        raise InputError(
+            f"{clip.path}: origin_px: null, and {first.name}'s size_m is null, too; the foot of "
+            f"the path shows the ramp only together with its height; {remedy}"
+        )
+    points = observation.position_m[0][:, observation.mask[0]]
+    count = points.shape[1]
+    splits = [
+        (line_through(points[:, :at]), line_through(points[:, at:]), at)
+        for at in range(MIN_POINTS, count - MIN_POINTS + 1)
+    ]
+    best = min(splits, key=lambda one: one[0].spread[0] + one[1].spread[0], default=None)
+    if best is None or not falls_deg(best[0]) - falls_deg(best[1]) >= MIN_BEND_DEG:
+        raise InputError(
+            f"{clip.path}: origin_px: null, and {first.name}'s path does not bend: the foot of the "
+            f"ramp is not declared; {remedy}"
+        )
+    before, after, at = best
+    # While the object turns its centre leaves both lines: those points are left out.
+    half_length, half_height = extents(first)
+    bend = _meeting(before, after)
+    is_far = np.linalg.norm(points - bend[:, None], axis=0) > 1.5 * half_length
+    parts = points[:, :at][:, is_far[:at]], points[:, at:][:, is_far[at:]]
+    if min(part.shape[1] for part in parts) >= MIN_POINTS:
+        before, after = map(line_through, parts)
+        bend = _meeting(before, after)
+    half_angle = math.radians(falls_deg(before) - falls_deg(after)) / 2
+    return bend - np.array([half_height * math.tan(half_angle), half_height])
+
+
+def _meeting(before: Line, after: Line) -> np.ndarray:
+    """Where two lines cross, `[2]`."""
+    both = np.stack([before.along, -after.along], axis=1)
+    return before.middle + np.linalg.solve(both, after.middle - before.middle)[0] * before.along
+
+
+def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
+    """`size_m` by name of the objects that have none.
+
+    Args:
+      clip: with its ramp's angle.
+      observation: the tracked points, which are taken for the objects' centres.
+    """
+    from galileo_jax.model.scene.scene import extents
+
+    angle = math.radians(clip.ramp_angle_deg or 0.0)
+    halves = [extents(item) if item.size_m else (None, None) for item in clip.objects]
+    lengths = [half[0] for half in halves]
+    for k in range(len(lengths) - 1):
+        apart, pair = distance_at_hit(observation, k), lengths[k : k + 2]
+        if apart is not None and None in pair:
+            known = sum(length for length in pair if length is not None)
+            share = max((apart - known) / pair.count(None), MIN_SIZE_M / 2)
+            lengths[k : k + 2] = [share if length is None else length for length in pair]
+    heights = [
+        _height(observation, k, angle) if half[1] is None else half[1]
+        for k, half in enumerate(halves)
+    ]
+    return {
+        item.name: _size(item, length or height, height)
+        for item, length, height in zip(clip.objects, lengths, heights, strict=True)
+        if item.size_m is None
+    }
+
+
+def _height(observation: Observation, k: int, angle: float) -> float:
+    """Of the centre above the surface, m."""
+    x, y = observation.position_m[k][:, observation.mask[k]]
+    if not x.size:
+        return MIN_SIZE_M  # never seen: building the scene refuses it
+    above_ramp = y * math.cos(angle) + x * math.sin(angle)
+    height = float(np.median(y[x > 0] if (x > 0).any() else above_ramp))
+    return float(np.clip(height, MIN_SIZE_M / 2, MAX_SIZE_M / 2))
+
+
+def distance_at_hit(observation: Observation, k: int) -> float | None:
+    """Between the centres of objects k and k + 1 when the one hits the other, m; None if never."""
+    both = observation.mask[k] & observation.mask[k + 1]
+    first, second = observation.position_m[k, 0, both], observation.position_m[k + 1, 0, both]
+    if both.sum() < 2 * NUM_BESIDE + 1:
+        return None
+    noise = math.sqrt(float(np.median(observation.covariance_m2[k + 1, 0, 0, both])))
+    gone = second - np.median(second[:NUM_BESIDE])
+    if np.median(gone[-NUM_BESIDE:]) < CLEARLY * noise:
+        return None
+    apart, times = second - first, observation.times_s[both]
+    at = int(np.argmax(gone > CLEARLY * noise))
+    before, after = slice(max(at - 1 - NUM_BESIDE, 0), max(at - 1, 0)), slice(at, at + NUM_BESIDE)
+    if min(len(apart[before]), len(apart[after])) < 2:
+        return float(apart.min())
+    down, up = (np.polyfit(times[part], apart[part], 1) for part in (before, after))
+    if down[0] >= up[0] - 1e-9:
+        return float(apart.min())
+    return float(np.polyval(up, (up[1] - down[1]) / (down[0] - up[0])))
+
+
+def _size(item: ClipObject, half_length: float, half_height: float) -> tuple[float, ...]:
+    """The size of its shape with these extents, as `extents` reads it; a box is as deep as long."""
+    match item.shape:
+        case "box":
+            size = (2 * half_length, 2 * half_length, 2 * half_height)
+        case "cylinder":
+            size = (half_length, 2 * half_height)
+        case "torus":
+            size = (max(half_length - half_height, 1.01 * half_height), half_height)
+        case _:
+            size = (half_height,)
+    return tuple(round(float(np.clip(value, MIN_SIZE_M, MAX_SIZE_M)), 4) for value in size)

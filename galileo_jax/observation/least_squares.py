@@ -1,0 +1,64 @@
+"""Linear least squares, and the straight line through points."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """What `design @ solution` makes of values, `[row, ...]`.
+
+    Attributes:
+      design: `[row, term]`.
+      solution: `[term, ...]`.
+      left: `[row, ...]`, values less what is fitted.
+    """
+
+    design: Float[np.ndarray, "row term"]
+    solution: np.ndarray
+    left: np.ndarray
+
+    @cached_property
+    def inverse(self) -> Float[np.ndarray, "term term"]:
+        """The covariance of the solution where the errors of the values have unit variance."""
+        return np.linalg.inv(self.design.T @ self.design)
+
+
+def least_squares(design: Float[np.ndarray, "row term"], values: np.ndarray) -> LinearFit:
+    """The solution that leaves the least sum of squares of values, `[row, ...]`."""
+    solution = np.linalg.lstsq(design, values, rcond=None)[0]
+    return LinearFit(design, solution, values - design @ solution)
+
+
+def polynomial(since_s: Float[np.ndarray, " row"], values: np.ndarray, degree: int) -> LinearFit:
+    """A polynomial of time through values, `[row, ...]`, highest power first."""
+    return least_squares(np.vander(since_s, degree + 1), values)
+
+
+class Line(NamedTuple):
+    """The straight line of least summed squared distances from points of a plane.
+
+    Attributes:
+      middle: `[2]`, of the points.
+      along, across: `[2]`, unit vectors; along points to what is farthest from the first point.
+      spread: summed squares across and along.
+    """
+
+    middle: Float[np.ndarray, "2"]
+    along: Float[np.ndarray, "2"]
+    across: Float[np.ndarray, "2"]
+    spread: tuple[float, float]
+
+
+def line_through(points: Float[np.ndarray, "2 point"]) -> Line:
+    """The principal axis of points, in their order."""
+    middle = points.mean(axis=1)
+    away, gone = points - middle[:, None], points - points[:, :1]
+    values, axes = np.linalg.eigh(away @ away.T)
+    farthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
+    along = axes[:, 1] if axes[:, 1] @ farthest >= 0 else -axes[:, 1]
+    return Line(middle, along, axes[:, 0], (max(float(values[0]), 0.0), float(values[1])))
