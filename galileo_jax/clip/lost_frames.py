@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip.plane_noise import position_noise_m
+from galileo_jax.clip.track_noise import position_noise_m
 
 WITHIN = 0.25
 """Of a whole number of frames: rougher jumps are something else."""

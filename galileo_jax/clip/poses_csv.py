@@ -11,7 +11,7 @@ import numpy as np
 
 from galileo_jax.clip.track_csv import MAX_POSITION_M, MIN_ROWS, TIME, check_times
 from galileo_jax.observation.poses import Poses
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.numbers import values_of
 
@@ -33,70 +33,73 @@ def read_poses_csv(path: Path, up: str = "z", edge_m: float | None = None) -> Po
       InputError: a column is missing, times do not increase, a row is no pose, or lengths are
         not metres.
     """
-    path = Path(path)
-    (_, header), *rows = read_cells(path)
-    columns = {title: at for at, title in enumerate(header) if title}
-    named = {title: _column(path, columns, title) for title in (TIME, *PLACE, *TURN)}
-    if len(rows) < MIN_ROWS:
-        raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
-    for line, row in rows:
-        if len(row) < max(named.values()) + 1:
-            raise InputError(
-                f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header"
-            )
-    table = values_of(path, rows, named)
-    lines = [f"line {line}" for line, _ in rows]
-    check_times(path, table[TIME], lines)
-    place = np.stack([table[title] for title in PLACE], axis=1)
-    quaternion = np.stack([table[title] for title in TURN], axis=1)
-    _check_places(path, place, lines, edge_m)
-    quaternion = _checked_turns(path, quaternion, lines)
+    with named(path):
+        times, place, quaternion = _read(Path(path), edge_m)
     if up == "y":
         place = place @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
         half = np.sqrt(0.5)  # a quarter turn about x
         w, x, y, z = quaternion.T
         quaternion = half * np.stack([w - x, w + x, y - z, y + z], axis=1)
-    return Poses(path.stem, table[TIME], place, quaternion)
+    return Poses(Path(path).stem, times, place, quaternion)
 
 
-def _column(path: Path, columns: dict[str, int], title: str) -> int:
+def _read(path: Path, edge_m: float | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times `[row]`, places `[row, 3]` and quaternions `[row, 4]`."""
+    (_, header), *rows = read_cells(path)
+    titled = {title: at for at, title in enumerate(header) if title}
+    columns = {title: _column(titled, title) for title in (TIME, *PLACE, *TURN)}
+    if len(rows) < MIN_ROWS:
+        raise InputError(f"{len(rows)} rows; at least {MIN_ROWS} expected")
+    for line, row in rows:
+        if len(row) <= max(columns.values()):
+            raise InputError(
+                f"line {line}: {len(row)} cells; {len(header)} expected as in the header"
+            )
+    table = values_of(rows, columns)
+    lines = [f"line {line}" for line, _ in rows]
+    check_times(table[TIME], lines)
+    place, quaternion = (np.stack([table[title] for title in titles], axis=1)
+                         for titles in (PLACE, TURN))  # fmt: skip
+    _check_places(place, lines, edge_m)
+    return table[TIME], place, _checked_turns(quaternion, lines)
+
+
+def _column(columns: dict[str, int], title: str) -> int:
     if title in columns:
         return columns[title]
     ending = [name for name in columns if name.endswith(f"_{title}") and title != TIME]
     if len(ending) != 1:
         what = "missing" if not ending else f"more than one body: {', '.join(ending)}"
-        raise InputError(
-            f"{path}: column {title!r}: {what}; poses have {', '.join((TIME, *PLACE, *TURN))}"
-        )
+        raise InputError(f"column {title!r}: {what}; poses have {', '.join((TIME, *PLACE, *TURN))}")
     return columns[ending[0]]
 
 
-def _check_places(path: Path, place: np.ndarray, lines: list[str], edge_m: float | None) -> None:
+def _check_places(place: np.ndarray, lines: list[str], edge_m: float | None) -> None:
     if (empty := ~np.isfinite(place).all(axis=1)).any():
-        raise InputError(f"{path}: {lines[int(empty.argmax())]}: a place is empty; metres expected")
+        raise InputError(f"{lines[int(empty.argmax())]}: a place is empty; metres expected")
     largest = float(np.abs(place).max())
     moved = float(np.ptp(place, axis=0).max())
     if largest > MAX_POSITION_M or (edge_m and moved > STILL_SIZES * edge_m):
         raise InputError(
-            f"{path}: places up to {largest:g} m, and a way of {moved:g} m; metres expected; are "
+            f"places up to {largest:g} m, and a way of {moved:g} m; metres expected; are "
             "these millimetres (divide them by 1000)?"
         )
     if edge_m and moved < edge_m / 100:
         raise InputError(
-            f"{path}: places within {moved:g} m; metres expected; are these kilometres, or does "
+            f"places within {moved:g} m; metres expected; are these kilometres, or does "
             "it not move?"
         )
 
 
-def _checked_turns(path: Path, quaternion: np.ndarray, lines: list[str]) -> np.ndarray:
+def _checked_turns(quaternion: np.ndarray, lines: list[str]) -> np.ndarray:
     """The quaternions `[row, 4]` at length 1, each of the sign that is nearer to the last."""
     if (empty := ~np.isfinite(quaternion).all(axis=1)).any():
-        raise InputError(f"{path}: {lines[int(empty.argmax())]}: qw to qz: empty; numbers expected")
+        raise InputError(f"{lines[int(empty.argmax())]}: qw to qz: empty; numbers expected")
     length = np.linalg.norm(quaternion, axis=1)
     if (wrong := np.abs(length - 1) > UNIT_WITHIN).any():
         at = int(wrong.argmax())
         raise InputError(
-            f"{path}: {lines[at]}: qw, qx, qy, qz: no rotation, their squares' root is "
+            f"{lines[at]}: qw, qx, qy, qz: no rotation, their squares' root is "
             f"{length[at]:.4g}; 1 expected"
         )
     quaternion = quaternion / length[:, None]
@@ -107,7 +110,7 @@ def _checked_turns(path: Path, quaternion: np.ndarray, lines: list[str]) -> np.n
         at = int(jumps.argmax()) + 1
         turn = np.degrees(2 * np.arccos(cosine[at - 1]))
         raise InputError(
-            f"{path}: {lines[at]}: turned by {turn:.0f} degrees since the row before; less than "
+            f"{lines[at]}: turned by {turn:.0f} degrees since the row before; less than "
             f"{np.degrees(MOST_TURN_RAD):.0f} expected; is the real part (qw) first?"
         )
     return quaternion

@@ -7,15 +7,15 @@ large as the scene (`UNMEASURED_SD_M`).
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip.plane_noise import position_noise_m, too_few_rows
+from galileo_jax.clip.declared_track import DeclaredTrack
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
+from galileo_jax.clip.track_noise import told_noise_m
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import named
 from galileo_jax.table.track_table import TrackTable
 
 WINDOWS, MIN_POINTS = 5, 5
@@ -29,6 +29,20 @@ MOST_SCATTER = 0.3
 """Of gravity: what scatters more from window to window is no fall."""
 
 MOST_OUT_OF_PLANE = 0.1
+
+
+def observed_where_finite(
+    names: tuple[str, ...],
+    times_s: np.ndarray,
+    position_m: np.ndarray,
+    covariance_m2: np.ndarray,
+    is_turning: bool = False,
+) -> Observation:
+    """Objects that are seen in the rows in which they have a place; NaN in the others."""
+    mask = np.asarray(np.isfinite(position_m).all(axis=1))
+    place = np.where(mask[:, None], position_m, np.nan)
+    covariance = np.where(mask[:, None, None], covariance_m2, np.nan)
+    return Observation(names, times_s, place, covariance, mask, is_turning=is_turning)
 
 
 def accelerations(times_s: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -62,88 +76,73 @@ def _sign(values: np.ndarray) -> int:
     return 1 if share >= MOST_SHARE else -1 if share <= 1 - MOST_SHARE else 0
 
 
-def in_plane(path: Path, file: ClipFile, table: TrackTable) -> tuple[TrackTable, tuple[str, ...]]:
+def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[str, ...]]:
     """The table with two axes, x and upright, in the order of `track_up`, and what was left out.
 
     Raises:
       InputError: it moves in space, or the axis that is declared to point up is not there.
     """
-    up = file.track_up.lstrip("-")
+    declared = of.file.track_up
+    up = declared.lstrip("-")
     if up == "y" and "y" not in table.axes:
         up = "z"
     if up not in table.axes:
-        raise InputError(f"{path}: track_up: {file.track_up}, but there is no column {up}")
+        raise of.wrong(f"track_up: {declared}, but there is no column {up}")
     others = [axis for axis in table.axes if axis != up]
     if not others:
-        raise InputError(f"{path}: only one coordinate, {up}")
-    spread = {a: float(np.ptp(_seen(table, a))) for a in others}
+        raise of.wrong(f"only one coordinate, {up}")
+    finite = [one[np.isfinite(one)] for one in table.position[0]]
+    spread = {axis: float(np.ptp(one)) if one.size else 0.0
+              for axis, one in zip(table.axes, finite, strict=True)}  # fmt: skip
     across = max(others, key=lambda axis: spread[axis])
     said: tuple[str, ...] = ()
     for axis in others:
         if axis == across:
             continue
-        largest = max(spread[across], float(np.ptp(_seen(table, up))))
-        if spread[axis] > MOST_OUT_OF_PLANE * largest:
-            raise InputError(
-                f"{path}: moves by {spread[axis]:g} along {axis} and by {spread[across]:g} along "
+        if spread[axis] > MOST_OUT_OF_PLANE * max(spread[across], spread[up]):
+            raise of.wrong(
+                f"moves by {spread[axis]:g} along {axis} and by {spread[across]:g} along "
                 f"{across}: in space; titles time_s, x_m, y_m, z_m in metres expected for that"
             )
-        said += (f"{path}: {axis} is not used: the motion is in the plane of {across} and {up}",)
+        said += (f"{of.path}: {axis} is not used: the motion is in the plane of {across} and {up}",)
     chosen = [table.axes.index(across), table.axes.index(up)]
     position = table.position[:, chosen]
     if up == "x":  # a quarter turn, so that the other axis becomes the level one
-        position = position * ([[1.0], [-1.0]] if file.track_up == "-x" else [[-1.0], [1.0]])
+        position = position * ([[1.0], [-1.0]] if declared == "-x" else [[-1.0], [1.0]])
     y_axis = "up" if up != "y" else table.y_axis
     resolution = tuple(table.resolution[n] for n in chosen) if table.resolution else ()
     return replace(table, position=position, resolution=resolution, y_axis=y_axis), said
 
 
-def _seen(table: TrackTable, axis: str) -> np.ndarray:
-    values = table.position[0, table.axes.index(axis)]
-    seen = values[np.isfinite(values)]
-    return seen if seen.size else np.zeros(1)
-
-
 def along_line(
-    yaml_path: Path,
-    path: Path,
-    file: ClipFile,
-    axis: str,
-    times: np.ndarray,
-    way_m: np.ndarray,
-    rounding_m: float,
+    of: DeclaredTrack, axis: str, times: np.ndarray, way_m: np.ndarray, rounding_m: float
 ) -> Observation:
     """One coordinate `[object, row]`, m, as a motion along the scenario's line.
 
     Raises:
       InputError: the scenario's motion is along no line, or its slope is not known.
     """
-    scenario = SCENARIOS[file.scenario]
+    scenario, file = of.scenario, of.file
     if scenario.line is None:
-        raise InputError(
-            f"{path}: only one coordinate ({axis}), but scenario {file.scenario} "
+        raise of.wrong(
+            f"only one coordinate ({axis}), but scenario {file.scenario} "
             f"({scenario.meaning}) needs x and y; along a line are "
             f"{', '.join(name for name, one in SCENARIOS.items() if one.line)}"
         )
     if scenario.line == "slope" and file.ramp_angle_deg is None:
-        raise InputError(
-            f"{yaml_path}: ramp_angle_deg: null, but {path.name} has the way alone; an angle in "
+        raise of.wrong_key(
+            f"ramp_angle_deg: null, but {of.path.name} has the way alone; an angle in "
             "degrees expected"
         )
-    sds = []
-    for index, item in enumerate(file.objects):
-        sd = position_noise_m(times, way_m[index])
-        if math.isnan(sd):
-            raise too_few_rows(path, item.name)
-        sds.append(max(sd, rounding_m / math.sqrt(12)))
-    names = tuple(item.name for item in file.objects)
-    sd_m = np.repeat(np.array(sds)[:, None], len(times), axis=1)
+    with named(of.path):
+        told = [told_noise_m(name, times, w) for name, w in zip(of.names, way_m, strict=True)]
+    sd_m = np.maximum(told, rounding_m / math.sqrt(12))[:, None] + np.zeros(len(times))
     is_upright = scenario.line == "down" and axis in ("y", "z")
     if is_upright and file.track_y is not None:
         sign = 1 if file.track_y == "up" else -1
     else:
         sign = sign_along(file, times, way_m[0])
-    return line_observation(file, names, times, sign * way_m, sd_m)
+    return line_observation(file, of.names, times, sign * way_m, sd_m)
 
 
 def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
@@ -162,20 +161,17 @@ def line_observation(
     file: ClipFile, names: tuple[str, ...], times: np.ndarray, way: np.ndarray, sd_m: np.ndarray
 ) -> Observation:
     """Ways `[object, row]`, m, along the scenario's line; across it nothing is known."""
-    scenario = SCENARIOS[file.scenario]
-    angle = math.radians(file.ramp_angle_deg or 0.0) if scenario.line == "slope" else 0.0
-    along = np.array([math.cos(angle), -math.sin(angle)])
-    if scenario.line == "down":
-        along = np.array([0.0, 1.0])
+    line = SCENARIOS[file.scenario].line
+    angle = math.radians(file.ramp_angle_deg or 0.0) if line == "slope" else 0.0
+    along = np.array([math.cos(angle), -math.sin(angle)] if line != "down" else [0.0, 1.0])
     across = np.array([-along[1], along[0]])
-    lifted = [_half_height(item.shape, item.size_m) for item in file.objects]
-    height = np.array(lifted)[:, None] if scenario.line == "slope" else np.zeros((len(names), 1))
-    place = np.einsum("a,ot->oat", along, way) + np.einsum("a,ot->oat", across, height + 0 * way)
+    height = np.array([_half_height(item.shape, item.size_m) for item in file.objects])
+    place = along[:, None] * way[:, None]
+    if line == "slope":
+        place = place + across[:, None] * height[:, None, None]
     covariance = np.einsum("a,b,ot->oabt", along, along, sd_m**2)
     covariance += (np.outer(across, across) * UNMEASURED_SD_M**2)[None, :, :, None]
-    mask = np.isfinite(way)
-    covariance = np.where(mask[:, None, None], covariance, np.nan)
-    return Observation(names, times, np.where(mask[:, None], place, np.nan), covariance, mask)
+    return observed_where_finite(names, times, place, covariance)
 
 
 def _half_height(shape: str, size_m: tuple[float, ...] | None) -> float:
@@ -184,35 +180,30 @@ def _half_height(shape: str, size_m: tuple[float, ...] | None) -> float:
     return size_m[2] / 2 if shape == "box" else sum(size_m) if shape == "torus" else size_m[0]
 
 
-def swung(
-    yaml_path: Path, path: Path, file: ClipFile, times: np.ndarray, angle_rad: np.ndarray
-) -> Observation:
+def swung(of: DeclaredTrack, times: np.ndarray, angle_rad: np.ndarray) -> Observation:
     """Angles `[object, row]` of a pendulum from the vertical, as places on its circle.
 
     Raises:
       InputError: the thread is not declared, or nothing hangs on one.
     """
-    if file.thread_m is None:
-        where = "" if "thread_m" in SCENARIOS[file.scenario].keys else ": only a pendulum's"
-        raise InputError(
-            f"{yaml_path}: thread_m: missing; {path.name} has an angle alone{where}; write "
+    thread_m = of.file.thread_m
+    if thread_m is None:
+        where = "" if "thread_m" in of.scenario.keys else ": only a pendulum's"
+        raise of.wrong_key(
+            f"thread_m: missing; {of.path.name} has an angle alone{where}; write "
             "thread_m: and its length in metres"
         )
-    place = file.thread_m * np.stack([np.sin(angle_rad), -np.cos(angle_rad)], axis=1)
-    covariance = np.full((len(place), 2, 2, len(times)), np.nan)
-    for index, item in enumerate(file.objects):
-        sd = position_noise_m(times, file.thread_m * angle_rad[index])
-        if math.isnan(sd):
-            raise too_few_rows(path, item.name)
-        covariance[index] = (np.eye(2) * sd**2)[:, :, None]
-    mask = np.isfinite(angle_rad)
-    covariance = np.where(mask[:, None, None], covariance, np.nan)
-    return Observation(tuple(i.name for i in file.objects), times, place, covariance, mask)
+    place = thread_m * np.stack([np.sin(angle_rad), -np.cos(angle_rad)], axis=1)
+    with named(of.path):
+        sd = np.array([told_noise_m(name, times, thread_m * one)
+                       for name, one in zip(of.names, angle_rad, strict=True)])  # fmt: skip
+    covariance = sd[:, None, None, None] ** 2 * np.eye(2)[:, :, None]
+    return observed_where_finite(of.names, times, place, covariance)
 
 
-def check_falls_down(yaml_path: Path, path: Path, file: ClipFile, observation: Observation) -> None:
+def check_falls_down(of: DeclaredTrack, observation: Observation) -> None:
     """Raises `InputError` where what falls or flies does so along another axis than down."""
-    if SCENARIOS[file.scenario].up_shows != "bend" or observation.position_m.shape[1] != 2:
+    if of.scenario.up_shows != "bend" or observation.position_m.shape[1] != 2:
         return
     seen = observation.mask[0]
     times = observation.times_s[seen]
@@ -228,14 +219,11 @@ def check_falls_down(yaml_path: Path, path: Path, file: ClipFile, observation: O
         # What slows down along x is braked; what falls ends as fast as it ever was.
         if scatter > MOST_SCATTER * abs(x) or ends < 0.3 * np.abs(speeds).max():
             return
-        side = "+x" if x > 0 else "-x"
-        up = "-x" if x > 0 else "x"
-        raise InputError(
-            f"{yaml_path}: {path.name} falls along {side}, {angle:.0f} degrees from down; write "
+        side, up = ("+x", "-x") if x > 0 else ("-x", "x")
+        raise of.wrong_key(
+            f"{of.path.name} falls along {side}, {angle:.0f} degrees from down; write "
             f"track_up: {up}"
         )
     if _sign(by_axis[1]) > 0:
-        raise InputError(
-            f"{yaml_path}: {path.name} falls up; write track_y: "
-            f"{'down' if file.track_y != 'down' else 'up'}"
-        )
+        other = "down" if of.file.track_y != "down" else "up"
+        raise of.wrong_key(f"{of.path.name} falls up; write track_y: {other}")

@@ -24,11 +24,17 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip.plane_noise import position_noise_m, roughness_covariance_m2
-from galileo_jax.clip.space_noise import space_covariance_m2, space_noise_m, space_sds_m
+from galileo_jax.clip.track_axes import observed_where_finite
+from galileo_jax.clip.track_noise import (
+    position_noise_m,
+    roughness_covariance_m2,
+    space_covariance_m2,
+    space_noise_m,
+    space_sds_m,
+)
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from galileo_jax.runtime.atomic_write import write_text
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.numbers import Rows, values_of
 
@@ -51,15 +57,12 @@ ONLY = "object1"
 
 _ISOTROPIC = ("sd_along_m", "sd_m")
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
-_TURNING = ("sd_angle_rad", "angle_rad")
-_FIELDS = (
-    *_TURNING,
-    *_COVARIANCE,
-    *_ISOTROPIC,
-    "x_m",
-    "y_m",
-    "z_m",
-)  # sd_x_m before x_m: the longest ending counts
+_PLACES = ("x_m", "y_m", "z_m")
+_FIELDS = ("sd_angle_rad", "angle_rad", *_COVARIANCE, *_ISOTROPIC, *_PLACES)
+"""sd_x_m before x_m: the longest ending counts."""
+
+Fields = dict[str, np.ndarray]
+"""The columns of one object, each `[row]`."""
 
 
 def read_observation_csv(path: Path) -> Observation:
@@ -67,37 +70,35 @@ def read_observation_csv(path: Path) -> Observation:
 
     Raises `InputError`, one line, naming the file and the column or line that is wrong.
     """
-    path = Path(path)
+    with named(path):
+        return _observation(Path(path))
+
+
+def _observation(path: Path) -> Observation:
     header, rows = _read_table(path)
-    names, columns = _find_columns(path, header)
+    columns = _find_columns(header)
+    names = tuple(columns)
     for line, row in rows:
-        _check_length(path, line, row, header, columns)
+        _check_length(line, row, header, columns)
     if len(rows) < MIN_ROWS:
-        raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
-    table = values_of(path, rows, {title: at for at, title in enumerate(header)})
+        raise InputError(f"{len(rows)} rows; at least {MIN_ROWS} expected")
+    table = values_of(rows, {title: at for at, title in enumerate(header)})
     times = table[TIME]
     lines = [f"line {line}" for line, _ in rows]
-    check_times(path, times, lines)
-
-    is_turning = "angle_rad" in columns[names[0]]
-    third = "angle_rad" if is_turning else "z_m"
-    axes = 3 if third in columns[names[0]] else 2
-    position = np.empty((len(names), axes, len(times)))
-    covariance = np.empty((len(names), axes, axes, len(times)))
-    for index, name in enumerate(names):
+    check_times(times, lines)
+    first = columns[names[0]]
+    is_turning = "angle_rad" in first
+    axes = ("x_m", "y_m", "angle_rad") if is_turning else _PLACES if "z_m" in first else _PLACES[:2]
+    position, covariance = [], []
+    for name in names:
         column = {field: table[title] for field, title in columns[name].items()}
-        places = [column[field] for field in ("x_m", "y_m", third)[:axes]]
-        position[index] = _positions(path, name, places, lines)
-        check_speed(path, name, times, position[index, : 2 if is_turning else axes])
-        if is_turning:
-            covariance[index] = _with_turning(path, name, column, times, position[index], lines)
-            continue
-        is_visible = np.isfinite(position[index, 0])
-        covariance[index] = _covariance(path, name, column, times, position[index], lines)
-        covariance[index][:, :, ~is_visible] = np.nan
-    mask = np.isfinite(position[:, 0])
-    covariance[np.broadcast_to(~mask[:, None, None], covariance.shape)] = np.nan
-    return Observation(names, times, position, covariance, mask, is_turning=is_turning)
+        place = _positions(name, np.stack([column[field] for field in axes]), lines)
+        check_speed(name, times, place[: 2 if is_turning else 3])
+        of = _with_turning if is_turning else _covariance
+        covariance.append(of(name, column, times, place, lines))
+        position.append(place)
+    place, error = np.array(position), np.array(covariance)
+    return observed_where_finite(names, times, place, error, is_turning)
 
 
 def write_observation_csv(path: Path, observation: Observation) -> None:
@@ -105,29 +106,22 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
 
     Positions and times come back to the last digit, covariances to rounding.
     """
-    covariance = observation.covariance_m2
-    axes = observation.position_m.shape[1]
-    sd = np.sqrt(np.stack([covariance[:, axis, axis] for axis in range(axes)], axis=1))
-    correlation = covariance[:, 0, 1] / (sd[:, 0] * sd[:, 1])
     header: list[str] = [TIME]
     columns: list[np.ndarray] = [observation.times_s]
     for index, name in enumerate(observation.names):
-        seen = observation.mask[index]
-        is_isotropic = np.array_equal(sd[index, 0][seen], sd[index, 1][seen]) and not np.any(
-            correlation[index][seen]
-        )
-        places = zip(("x_m", "y_m", "z_m"), observation.position_m[index], strict=False)
-        fields: dict[str, np.ndarray] = dict(places)
+        seen, covariance = observation.mask[index], observation.covariance_m2[index]
+        sd = np.sqrt(np.einsum("aat->at", covariance))
+        correlation = covariance[0, 1] / (sd[0] * sd[1])
+        fields: Fields = dict(zip(_PLACES, observation.position_m[index], strict=False))
         if observation.is_turning:
             fields["angle_rad"] = fields.pop("z_m")
-            fields["sd_m"], fields["sd_angle_rad"] = sd[index, 0], sd[index, 2]
-        elif axes == 3:
-            fields["sd_m"], fields["sd_along_m"] = space_sds_m(covariance[index])
-        elif is_isotropic:
-            fields["sd_m"] = sd[index, 0]
+            fields["sd_m"], fields["sd_angle_rad"] = sd[0], sd[2]
+        elif len(sd) == 3:
+            fields["sd_m"], fields["sd_along_m"] = space_sds_m(covariance)
+        elif np.array_equal(sd[0][seen], sd[1][seen]) and not np.any(correlation[seen]):
+            fields["sd_m"] = sd[0]
         else:
-            fields["sd_x_m"], fields["sd_y_m"] = sd[index]
-            fields["correlation"] = correlation[index]
+            fields |= dict(zip(_COVARIANCE, (*sd, correlation), strict=True))
         for field, values in fields.items():
             header.append(f"{name}_{field}")
             columns.append(np.where(seen, values, np.nan))
@@ -142,25 +136,21 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
 def _read_table(path: Path) -> tuple[list[str], Rows]:
     """The titles and the rows, without the columns and rows that are empty."""
     (_, header), *rows = read_cells(path)
-    untitled = {at for at, title in enumerate(header) if not title}
-    used = {at for _, row in rows for at, cell in enumerate(row) if cell}
     for line, row in rows:
-        for at in sorted(untitled):
-            if at < len(row) and row[at]:
+        for at, (title, cell) in enumerate(zip(header, row, strict=False)):
+            if cell and not title:
                 raise InputError(
-                    f"{path}: line {line}: {row[at][:40]!r} stands in column {at + 1}, which "
+                    f"line {line}: {cell[:40]!r} stands in column {at + 1}, which "
                     "has no title; give it one, such as object1_x_m, or empty the column"
                 )
-    shown = [at for at in range(len(header)) if at not in untitled]
-    beyond = range(len(header), max(used, default=0) + 1)
-    titles = [header[at] for at in shown]
-    return titles, [
-        (line, [row[at] for at in (*shown, *beyond) if at < len(row)]) for line, row in rows
-    ]
+    shown = [at for at, title in enumerate(header) if title]
+    rows = [(line, [row[at] for at in shown if at < len(row)] + row[len(header) :])
+            for line, row in rows]  # fmt: skip
+    return [header[at] for at in shown], rows
 
 
 def _check_length(
-    path: Path, line: int, row: list[str], header: list[str], columns: dict[str, dict[str, str]]
+    line: int, row: list[str], header: list[str], columns: dict[str, dict[str, str]]
 ) -> None:
     """Refuses a row with more cells than titles, or one that is cut off within an object.
 
@@ -178,21 +168,18 @@ def _check_length(
     if len(row) > len(header) and all(cell.lstrip("+-").isdigit() for cell in row if cell):
         hint = "; numbers with a decimal comma need a semicolon between the cells, or a point"
     raise InputError(
-        f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header{hint}"
+        f"line {line}: {len(row)} cells; {len(header)} expected as in the header{hint}"
     )
 
 
-def _find_columns(
-    path: Path, header: list[str]
-) -> tuple[tuple[str, ...], dict[str, dict[str, str]]]:
-    """The objects' names in order, and for each the titles of its columns by field."""
+def _find_columns(header: list[str]) -> dict[str, dict[str, str]]:
+    """By object, in their order, the titles of its columns by field."""
     repeated = next((name for name in header if header.count(name) > 1), None)
     if repeated is not None:
-        raise InputError(f"{path}: column {repeated!r}: given twice; keep one")
+        raise InputError(f"column {repeated!r}: given twice; keep one")
     columns: dict[str, dict[str, str]] = {}
     if {"x_m", "y_m"} <= set(header):
-        fields = {title: title for title in header if title in (*_ISOTROPIC, "x_m", "y_m", "z_m")}
-        return (ONLY,), {ONLY: fields}
+        return {ONLY: {title: title for title in header if title in (*_ISOTROPIC, *_PLACES)}}
     for title in header:
         if title == TIME:
             continue
@@ -201,86 +188,77 @@ def _find_columns(
             wanted = [TIME, *(f"object{n}_{f}" for n in (1, 2) for f in reversed(_FIELDS))]
             close = difflib.get_close_matches(title, wanted, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(wanted[:4])}, ..."
-            raise InputError(f"{path}: column {title[:40]!r}: unknown; {hint}")
+            raise InputError(f"column {title[:40]!r}: unknown; {hint}")
         columns.setdefault(title.removesuffix(f"_{field}"), {})[field] = title
     if TIME not in header:
-        raise InputError(f"{path}: column {TIME!r}: missing")
+        raise InputError(f"column {TIME!r}: missing")
     if not columns:
-        raise InputError(f"{path}: column 'object1_x_m': missing; no object in the header")
+        raise InputError("column 'object1_x_m': missing; no object in the header")
     for name, fields in columns.items():
-        has_sd, has_covariance = "sd_m" in fields, any(f in fields for f in _COVARIANCE)
-        if has_sd and has_covariance:
-            raise InputError(f"{path}: column '{name}_sd_m': give it or the covariance, not both")
-        if "z_m" in fields and has_covariance:
-            raise InputError(
-                f"{path}: column '{name}_z_m': in space write '{name}_sd_m', for all axes"
-            )
-        in_space = any("z_m" in other for other in columns.values())
-        turns = any("angle_rad" in other for other in columns.values())
-        if turns and (in_space or has_covariance):
-            raise InputError(
-                f"{path}: column '{name}_angle_rad': of what is seen from above, without z_m and "
-                f"with '{name}_sd_m' for x and y"
-            )
-        required = (
-            "x_m",
-            "y_m",
-            *(("z_m",) if in_space else ()),
-            *(("angle_rad",) if turns else ()),
-            *(_COVARIANCE if has_covariance else ()),
+        _check_fields(name, fields, {field for other in columns.values() for field in other})
+    return columns
+
+
+def _check_fields(name: str, fields: dict[str, str], of_any: set[str]) -> None:
+    """Refuses an object whose columns do not go together, or are not those of the others."""
+    has_covariance = any(field in fields for field in _COVARIANCE)
+    in_space, turns = "z_m" in of_any, "angle_rad" in of_any
+    if "sd_m" in fields and has_covariance:
+        raise InputError(f"column '{name}_sd_m': give it or the covariance, not both")
+    if "z_m" in fields and has_covariance:
+        raise InputError(f"column '{name}_z_m': in space write '{name}_sd_m', for all axes")
+    if turns and (in_space or has_covariance):
+        raise InputError(
+            f"column '{name}_angle_rad': of what is seen from above, without z_m and "
+            f"with '{name}_sd_m' for x and y"
         )
-        missing = next((field for field in required if field not in fields), None)
-        if missing:
-            raise InputError(f"{path}: column '{name}_{missing}': missing")
-    return tuple(columns), columns
+    required = [*_PLACES[: 2 + in_space], *["angle_rad"] * turns, *_COVARIANCE * has_covariance]
+    missing = next((field for field in required if field not in fields), None)
+    if missing:
+        raise InputError(f"column '{name}_{missing}': missing")
 
 
-def check_times(path: Path, times: np.ndarray, rows: Sequence[str] | None = None) -> None:
+def check_times(times: np.ndarray, rows: Sequence[str] | None = None) -> None:
     """Raises `InputError` unless `times` `[row]`, s, increase and are seconds.
 
     `rows` are what the rows are called in the message; default: row 1, row 2, ...
     """
     rows = rows or [f"row {n + 1}" for n in range(len(times))]
     if np.isnan(times).any():
-        raise InputError(
-            f"{path}: {rows[int(np.isnan(times).argmax())]}: {TIME}: empty; seconds expected"
-        )
+        raise InputError(f"{rows[int(np.isnan(times).argmax())]}: {TIME}: empty; seconds expected")
     steps = np.diff(times)
     if (steps <= 0).any():
         at = int((steps <= 0).argmax()) + 1
         raise InputError(
-            f"{path}: {rows[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; "
-            "times must increase"
+            f"{rows[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; times must increase"
         )
     if np.median(steps) >= MAX_STEP_S:
         raise InputError(
-            f"{path}: {TIME}: rows are {np.median(steps):g} s apart; seconds expected, "
+            f"{TIME}: rows are {np.median(steps):g} s apart; seconds expected, "
             f"less than {MAX_STEP_S:g} apart; are these milliseconds or frame numbers (divide them "
             "by 1000 or by the frame rate)?"
         )
 
 
-def _positions(
-    path: Path, name: str, places: Sequence[np.ndarray], lines: Sequence[str]
-) -> np.ndarray:
-    position = np.stack(places)
+def _positions(name: str, position: np.ndarray, lines: Sequence[str]) -> np.ndarray:
+    """Places `[axis, row]` that can be metres, or `InputError`."""
     empty = np.isnan(position)
     if (partly := empty.any(axis=0) & ~empty.all(axis=0)).any():
-        which = "only one of x and y is" if len(places) == 2 else "not all of x, y and z are"
-        raise InputError(f"{path}: {lines[int(partly.argmax())]}: {name}: {which} given")
+        which = "only one of x and y is" if len(position) == 2 else "not all of x, y and z are"
+        raise InputError(f"{lines[int(partly.argmax())]}: {name}: {which} given")
     if (count := int((~empty[0]).sum())) < MIN_ROWS:
-        raise InputError(f"{path}: {name}: visible in {count} rows; at least {MIN_ROWS} expected")
+        raise InputError(f"{name}: visible in {count} rows; at least {MIN_ROWS} expected")
     largest = float(np.nanmax(np.abs(position)))
     usual = float(np.nanmedian(np.abs(position).max(axis=0)))
     if largest > MAX_POSITION_M or (largest > FAR_M and largest > FAR_ALONE * usual):
         raise InputError(
-            f"{path}: {name}: a position of {largest:g} m; metres expected; "
-            "are these pixels or millimetres?"
+            f"{name}: a position of {largest:g} m; metres expected; are these pixels or "
+            "millimetres?"
         )
     return position
 
 
-def check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
+def check_speed(name: str, times: np.ndarray, position: np.ndarray) -> None:
     """Refuses a track that is much too fast over several tenths of it: lengths in other units."""
     seen = np.flatnonzero(np.isfinite(position[0]))
     step = max(len(seen) // 10, 2)
@@ -291,30 +269,24 @@ def check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) 
     usual = float(np.quantile(speed, 0.8))
     if usual > MAX_SPEED_M_S:
         raise InputError(
-            f"{path}: {name}: moves at {usual:.3g} m/s; metres and seconds expected; are these "
+            f"{name}: moves at {usual:.3g} m/s; metres and seconds expected; are these "
             "places in millimetres (divide them by 1000) or pixels?"
         )
 
 
 def _with_turning(
-    path: Path,
-    name: str,
-    column: dict[str, np.ndarray],
-    times: np.ndarray,
-    position: np.ndarray,
-    lines: Sequence[str],
+    name: str, column: Fields, times: np.ndarray, position: np.ndarray, lines: Sequence[str]
 ) -> np.ndarray:
     """`[3, 3, row]` of x, y (m^2) and the turning (rad^2), which is made continuous in place."""
     seen = np.isfinite(position[2])
     position[2, seen] = np.unwrap(position[2, seen])
-    plane = {field: values for field, values in column.items() if "angle" not in field}
     found = np.zeros((3, 3, len(times)))
-    found[:2, :2] = _covariance(path, name, plane, times, position[:2], lines)
+    found[:2, :2] = _covariance(name, column, times, position[:2], lines)
     given = column.get("sd_angle_rad")
     sd = np.full(len(times), position_noise_m(times, position[2])) if given is None else given
     if not ((sd > 0) & (sd <= MAX_SD_RAD))[seen].all():
         raise InputError(
-            f"{path}: {name}: standard deviation {sd[seen].max():g} rad of its turning; more than "
+            f"{name}: standard deviation {sd[seen].max():g} rad of its turning; more than "
             f"0 and at most {MAX_SD_RAD:g} expected; are these degrees?"
         )
     found[2, 2] = sd**2
@@ -322,14 +294,9 @@ def _with_turning(
 
 
 def _covariance(
-    path: Path,
-    name: str,
-    column: dict[str, np.ndarray],
-    times: np.ndarray,
-    position: np.ndarray,
-    lines: Sequence[str],
+    name: str, column: Fields, times: np.ndarray, position: np.ndarray, lines: Sequence[str]
 ) -> np.ndarray:
-    """`[2, 2, row]`, m^2, from the columns or else from the positions' roughness."""
+    """`[axis, axis, row]`, m^2, from the columns or else from the positions' roughness."""
     correlation = np.zeros(len(times))
     if "sd_along_m" in column:
         return space_covariance_m2(times, position, column["sd_m"], column["sd_along_m"])
@@ -338,19 +305,18 @@ def _covariance(
     elif "sd_x_m" in column:
         sd = np.stack([column["sd_x_m"], column["sd_y_m"]])
         correlation = column["correlation"]
+    elif len(position) == 3:
+        return space_covariance_m2(times, position, *space_noise_m(name, times, position))
     else:
-        if len(position) == 3:
-            return space_covariance_m2(times, position, *space_noise_m(path, name, times, position))
-        return roughness_covariance_m2(path, name, times, position)
+        return roughness_covariance_m2(name, times, position)
     is_visible = np.isfinite(position[0])
     is_right = (sd > 0).all(axis=0) & (sd <= MAX_SD_M).all(axis=0) & (np.abs(correlation) < 1)
     if not is_right[is_visible].all():
         at = int((is_visible & ~is_right).argmax())
         raise InputError(
-            f"{path}: {lines[at]}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
+            f"{lines[at]}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
             f"most {MAX_SD_M:g} expected, correlation between -1 and 1"
         )
-    shared = correlation * sd[0] * sd[1]
     covariance = np.einsum("at,ab->abt", sd**2, np.eye(len(sd)))
-    covariance[0, 1] = covariance[1, 0] = shared
+    covariance[0, 1] = covariance[1, 0] = correlation * sd[0] * sd[1]
     return covariance

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.load import check_clip, load_clip
-from galileo_jax.clip.plane_noise import position_noise_m
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.experiment.lab import LabError
 from galileo_jax.experiment.settings import known_as

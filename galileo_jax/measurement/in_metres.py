@@ -29,10 +29,10 @@ from jaxtyping import Bool, Float
 
 from galileo_jax.clip.lost_frames import with_lost_frames
 from galileo_jax.clip.picture_plane import nearby_planes, picture_plane
-from galileo_jax.clip.plane_noise import position_noise_m
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_file import read_track
+from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
 from galileo_jax.measurement.shared_errors import beside, with_errors
 from galileo_jax.measurement.track_cache import track_once

@@ -5,7 +5,6 @@ Dates and clocks are counted from the first row on before anything is rounded.
 
 import re
 from datetime import UTC, datetime
-from pathlib import Path
 
 import numpy as np
 
@@ -16,69 +15,57 @@ CLOCK = re.compile(r"(?:(\d{1,4}):)?(\d{1,4}):(\d{1,2})(?:[.,](\d+))?")
 FIELDS = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,3})")
 DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(:\d{2}([.,]\d+)?)?\s?(Z|[+-]\d{2}:?\d{2})?")
 COMMON_FPS = (24, 25, 30, 48, 50, 60, 100, 120, 240)
-UNIX_MS = (1e11, 1e14)
-"""Milliseconds since 1970 from 1973 on; no motion lasts as many."""
 
 
 def is_time(cell: str) -> bool:
     """Whether a cell is a date or a clock, not a plain number."""
-    return ":" in cell and bool(
-        CLOCK.fullmatch(cell) or FIELDS.fullmatch(cell) or DATE.fullmatch(cell)
-    )
+    return ":" in cell and any(form.fullmatch(cell) for form in (CLOCK, FIELDS, DATE))
 
 
-def clock_times(path: Path, rows: Rows, title: str, at: int, fps: float | None) -> Numbers | None:
+def clock_times(rows: Rows, title: str, at: int, fps: float | None) -> Numbers | None:
     """Seconds from the first row on of a column of dates or clocks; None: it has none.
 
     Raises:
       InputError: a cell is of another form than the first; or whether the last of four fields
         counts frames or hundredths cannot be told.
     """
-    there = (row[at] for _, row in rows if at < len(row))
-    first = next((cell for cell in there if not is_nothing(cell)), "")
-    form = next((one for one in (FIELDS, CLOCK, DATE) if one.fullmatch(first)), None)
-    if form is None or not is_time(first):
-        return None
     cells = [(line, row[at] if at < len(row) else "") for line, row in rows]
-    parsed = []
-    for line, cell in cells:
-        match = form.fullmatch(cell)
+    first = next((cell for _, cell in cells if not is_nothing(cell)), "")
+    form = next((one for one in (FIELDS, CLOCK, DATE) if one.fullmatch(first)), None)
+    if form is None:
+        return None
+    parsed = [form.fullmatch(cell) for _, cell in cells]
+    for (line, cell), match in zip(cells, parsed, strict=True):
         if match is None and not is_nothing(cell):
             raise InputError(
-                f"{path}: line {line}: {title}: {cell[:40]!r} is not a time such as {first[:40]!r}"
+                f"line {line}: {title}: {cell[:40]!r} is not a time such as {first[:40]!r}"
             )
-        parsed.append(match)
     try:
         if form is DATE:
             return _dates(parsed)
     except ValueError as error:
-        raise InputError(
-            f"{path}: {title}: {error}; a date such as {first[:40]!r} expected"
-        ) from None
+        raise InputError(f"{title}: {error}; a date such as {first[:40]!r} expected") from None
+    whole = np.array([np.nan if m is None else _seconds(m) for m in parsed])
+    last = ["" if m is None else m[4] or "" for m in parsed]
     if form is CLOCK:
-        values = [np.nan if m is None else _seconds(m[1], m[2], m[3]) + float(f"0.{m[4] or 0}")
-                  for m in parsed]  # fmt: skip
-        digits = max((len(m[4] or "") for m in parsed if m), default=0)
-        return _from_first(np.array(values), 10.0**-digits)
-    whole = np.array([np.nan if m is None else _seconds(m[1], m[2], m[3]) for m in parsed])
-    last = np.array([np.nan if m is None else float(m[4]) for m in parsed])
-    parts = _parts_of_second(whole, last, fps)
+        digits = max(map(len, last))
+        return _from_first(whole + [float(f"0.{part or 0}") for part in last], 10.0**-digits)
+    counted = np.array([float(part or "nan") for part in last])
+    parts = _parts_of_second(whole, counted, fps)
     if parts is None:
         raise InputError(
-            f"{path}: {title}: {first!r}: whether its last field counts frames or hundredths of a "
+            f"{title}: {first!r}: whether its last field counts frames or hundredths of a "
             "second is not told; write seconds, such as 0.125"
         )
-    return _from_first(whole + last / parts, 1.0 / parts)
+    return _from_first(whole + counted / parts, 1.0 / parts)
 
 
-def _seconds(hours: str | None, minutes: str, seconds: str) -> float:
-    return 3600.0 * int(hours or 0) + 60.0 * int(minutes) + int(seconds)
+def _seconds(match: re.Match[str]) -> float:
+    return 3600.0 * int(match[1] or 0) + 60.0 * int(match[2]) + int(match[3])
 
 
 def _dates(parsed: list[re.Match[str] | None]) -> Numbers:
-    moments = [
-        None if m is None else datetime.fromisoformat(m[0].replace(",", ".")) for m in parsed
-    ]
+    moments = [m and datetime.fromisoformat(m[0].replace(",", ".")) for m in parsed]
     moments = [m if m is None or m.tzinfo else m.replace(tzinfo=UTC) for m in moments]
     start = next(m for m in moments if m is not None)
     values = [np.nan if m is None else (m - start).total_seconds() for m in moments]
@@ -104,8 +91,8 @@ def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> 
         near = min((*COMMON_FPS, 1000), key=lambda one: abs(one - found))
         if np.abs(jumps - near).max() <= max(1.0, 0.5 * step) and last.max() < near:
             return float(near)
-    if last.size and 60 <= last.max() < 100 and (fps or 0) <= 60:
+    if 60 <= last.max() < 100 and (fps or 0) <= 60:
         return 100.0
-    if fps is not None and last.size and last.max() < round(fps):
-        return float(round(fps)) if np.median(steps) == 1 else None
+    if fps is not None and last.max() < round(fps) and np.median(steps) == 1:
+        return float(round(fps))
     return None

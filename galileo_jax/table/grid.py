@@ -7,7 +7,6 @@ numbers, and as many in each row: '20,06; 159,96' and '20,06, 159,96' are two nu
 import csv
 import io
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 from galileo_jax.runtime.errors import InputError
@@ -15,7 +14,6 @@ from galileo_jax.table.clock import is_time
 from galileo_jax.table.numbers import Rows, is_nothing, is_number
 from galileo_jax.table.spreadsheet import is_spreadsheet, spreadsheet_rows
 from galileo_jax.table.text import content_of, decoded
-from galileo_jax.table.titles import count_words
 
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,|])\s*", re.IGNORECASE)  # Excel's own first line
@@ -28,73 +26,49 @@ MAX_COLUMNS = 1000
 EMPTY = "empty; a row of titles and numbers expected"
 
 
-@dataclass(frozen=True)
-class Grid:
-    """The cells of a file.
-
-    Attributes:
-      rows: that are not blank, with their line numbers.
-      separator: between cells; "" of a spreadsheet.
-    """
-
-    rows: Rows
-    separator: str = ""
+def read_cells(path: Path) -> Rows:
+    """The cells of a file; as `cells_of`."""
+    return cells_of(content_of(path))
 
 
-def read_grid(path: Path) -> Grid:
-    """The cells of a text table or of a spreadsheet's first sheet with numbers.
+def cells_of(content: bytes) -> Rows:
+    """The rows that are not blank of a text table, or of a spreadsheet's first sheet with numbers.
 
     Raises:
-      InputError: the file cannot be read, is no table, or has too many cells.
+      InputError: it is no table, or has too many cells.
     """
-    path = Path(path)
-    content = content_of(path)
     if is_spreadsheet(content):
-        return Grid(_checked(path, spreadsheet_rows(path, content)))
-    text = decoded(path, content, count_words)
-    lines = _lines(path, text)
-    separator = _named(lines) or _separator([line for _, line in lines])
-    rows = _split(path, lines, separator)
-    if all(not any(row[1:]) for _, row in rows) and any(
-        m in row[0] for _, row in rows for m in "\t;,"
-    ):
+        return _checked(spreadsheet_rows(content))
+    rows = _split(_lines(decoded(content)))
+    is_alone = all(not any(row[1:]) for _, row in rows)
+    if is_alone and any(mark in row[0] for _, row in rows for mark in "\t;,"):
         # A spreadsheet that took each line for one cell puts quotes round it, or empty cells after.
-        lines = [(number, row[0]) for number, row in rows]
-        separator = _named(lines) or _separator([line for _, line in lines])
-        rows = _split(path, lines, separator)
-    return Grid(_checked(path, rows), separator)
+        rows = _split([(number, row[0]) for number, row in rows])
+    return _checked(rows)
 
 
-def read_cells(path: Path) -> Rows:
-    """The rows that are not blank, each with its line number; as `read_grid`."""
-    return read_grid(path).rows
-
-
-def _lines(path: Path, text: str) -> list[tuple[int, str]]:
+def _lines(text: str) -> list[tuple[int, str]]:
     found = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip()]
     if not found:
-        raise InputError(f"{path}: {EMPTY}")
+        raise InputError(EMPTY)
     if len(found) > MAX_ROWS:
         raise InputError(
-            f"{path}: {len(found)} rows; at most {MAX_ROWS} expected; keep the part that moves, or "
+            f"{len(found)} rows; at most {MAX_ROWS} expected; keep the part that moves, or "
             "every tenth row"
         )
     number, longest = max(found, key=lambda one: len(one[1]))
     if len(longest) > MAX_LINE:
-        raise InputError(f"{path}: line {number}: {len(longest)} letters; not a table of a motion")
+        raise InputError(f"line {number}: {len(longest)} letters; not a table of a motion")
     return found
 
 
-def _named(lines: list[tuple[int, str]]) -> str | None:
-    """The separator that a first line `sep=;` names; takes that line out."""
+def _named_separator(lines: list[tuple[int, str]]) -> str | None:
+    """The separator that a first line `sep=;` names."""
     found = SEPARATOR_LINE.fullmatch(lines[0][1].strip('\ufeff\r\n"'))
-    if found is None or len(lines) < 2:
-        return None
-    del lines[0]
-    return found[1]
+    return found[1] if found and len(lines) > 1 else None
 
 
-def _separator(lines: list[str]) -> str:
+def _likely_separator(lines: list[str]) -> str:
     """The separator in which most of the lines in the middle are as many numbers each."""
     lines = [line for line in lines if not COMMENT.match(line)] or lines
     sample = lines[len(lines) // 2 :][:SAMPLE]
@@ -145,7 +119,12 @@ def _cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in row]
 
 
-def _split(path: Path, lines: list[tuple[int, str]], separator: str) -> Rows:
+def _split(lines: list[tuple[int, str]]) -> Rows:
+    separator = _named_separator(lines)
+    if separator is None:
+        separator = _likely_separator([line for _, line in lines])
+    else:
+        lines = lines[1:]
     if separator in (", ", " "):
         rows = [(number, _cells(line, separator)) for number, line in lines]
     else:
@@ -155,20 +134,16 @@ def _split(path: Path, lines: list[tuple[int, str]], separator: str) -> Rows:
             rows = [(lines[min(reader.line_num, len(lines)) - 1][0], [cell.strip() for cell in row])
                     for row in reader]  # fmt: skip
         except csv.Error as error:
-            raise InputError(f"{path}: not a table: line {reader.line_num}: {error}") from None
+            raise InputError(f"not a table: line {reader.line_num}: {error}") from None
     rows = [(line, row) for line, row in rows if any(row)]
     if not rows:
-        raise InputError(f"{path}: {EMPTY}")
+        raise InputError(EMPTY)
     return rows
 
 
-def _checked(path: Path, rows: Rows) -> Rows:
-    if (width := max(len(row) for _, row in rows)) > MAX_COLUMNS:
-        raise InputError(
-            f"{path}: {width} columns; at most {MAX_COLUMNS} expected; keep time and place"
-        )
-    if (count := sum(len(row) for _, row in rows)) > MAX_CELLS:
-        raise InputError(
-            f"{path}: {count} cells; at most {MAX_CELLS} expected; keep time and place"
-        )
+def _checked(rows: Rows) -> Rows:
+    width, count = max(len(row) for _, row in rows), sum(len(row) for _, row in rows)
+    for what, found, most in (("columns", width, MAX_COLUMNS), ("cells", count, MAX_CELLS)):
+        if found > most:
+            raise InputError(f"{found} {what}; at most {most} expected; keep time and place")
     return rows

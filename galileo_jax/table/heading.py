@@ -6,7 +6,6 @@ t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,
 """
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
@@ -46,7 +45,7 @@ class Heading:
         return title if is_alone else f"{title} (column {n + 1})" if title else f"column {n + 1}"
 
 
-def split_heading(path: Path, rows: Rows) -> Heading:
+def split_heading(rows: Rows) -> Heading:
     """Parts the titles from the numbers.
 
     Raises:
@@ -57,27 +56,27 @@ def split_heading(path: Path, rows: Rows) -> Heading:
     start = next((n for n, (_, row) in enumerate(rows) if _is_body(row, words)), None)
     if start is None:
         raise InputError(
-            f"{path}: no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
+            f"no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
             "place in columns expected, such as t (s), x (m), y (m)"
         )
     commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
     above = [(line, _uncommented(row)) for line, row in rows[:start]]
     body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
     counts = [_num_titles(row) for _, row in above]
-    above, counts = _with_markers(above, counts)
+    if not any(counts):
+        above += _marker_titles(above)
+        counts += [len(row) for _, row in above[start:]]
     at = max(range(len(counts)), key=lambda n: (counts[n], n), default=-1)
     if at < 0 or not counts[at]:
         # Titles in words that are not known are the last row that fills the columns.
-        at = max((n for n, (_, row) in enumerate(above) if _filled(row) >= min(width, 2)
+        at = max((n for n, (_, row) in enumerate(above) if sum(map(bool, row)) >= min(width, 2)
                   and not _is_units(row)), default=-1)  # fmt: skip
     cut = next((n for n in range(at + 1, len(above)) if at >= 0 and _has_number(above[n][1])), None)
     if cut is not None:  # a bad cell in the first row of numbers
         above, body = above[:cut], [*rows[cut:start], *body]
     titles = (above[at][1] if at >= 0 else []) + [""] * width
-    used = _last_used(body, words)
-    named = max((n + 1 for n, title in enumerate(titles) if title), default=0)
-    if at >= 0 and used[0] >= named:
-        _refuse_longer(path, body, used[1], named, titles)
+    if at >= 0:
+        _check_lengths(body, words, titles)
     units = next((row for _, row in above if _is_units(row)), [])
     over = [
         row
@@ -93,9 +92,8 @@ def split_heading(path: Path, rows: Rows) -> Heading:
         if not meaning.name and n < len(names) and meaning.role not in ("time", "frame"):
             meaning = replace(meaning, name=names[n])
         meanings.append(meaning)
-    return Heading(
-        tuple(titles[:width]), tuple(meanings), body, any(m.role for m in meanings), _rate(above)
-    )
+    is_titled = any(one.role for one in meanings)
+    return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
 
 
 def _num_titles(row: list[str]) -> int:
@@ -115,6 +113,10 @@ def _is_value(cell: str) -> bool:
     return is_number(cell) or is_time(cell)
 
 
+def _has_number(row: list[str]) -> bool:
+    return any(map(_is_value, row))
+
+
 def _word_columns(rows: Rows, width: int) -> set[int]:
     """Columns of words: labels that most rows have."""
     later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
@@ -128,20 +130,12 @@ def _word_columns(rows: Rows, width: int) -> set[int]:
 
 def _is_body(row: list[str], words: set[int]) -> bool:
     cells = [cell for n, cell in enumerate(row) if n not in words and cell]
-    return any(map(_is_value, cells)) and all(_is_value(c) or is_nothing(c) for c in cells)
-
-
-def _has_number(row: list[str]) -> bool:
-    return any(_is_value(cell) for cell in row)
+    return _has_number(cells) and all(_is_value(cell) or is_nothing(cell) for cell in cells)
 
 
 def _uncommented(row: list[str]) -> list[str]:
     first = COMMENT.sub("", row[0], count=1)
     return row[1:] if not first and row[0] else [first, *row[1:]]
-
-
-def _filled(row: list[str]) -> int:
-    return sum(map(bool, row))
 
 
 def _is_units(row: list[str]) -> bool:
@@ -150,26 +144,23 @@ def _is_units(row: list[str]) -> bool:
     return bool(known) and sum(known) > len(known) / 2 and "t" not in [c.lower() for c in cells]
 
 
-def _with_markers(above: Rows, counts: list[int]) -> tuple[Rows, list[int]]:
-    """With titles for the three columns of each marker, where only the markers are named."""
-    for line, row in above:
-        if row and row[0].lower() == MARKERS and not any(counts):
-            titles = [f"{name} {axis}" for name in row[1:] if name for axis in "XYZ"]
-            return [*above, (line, titles)], [*counts, len(titles)]
-    return above, counts
+def _marker_titles(above: Rows) -> Rows:
+    """A row with titles for the three columns of each marker, where only the markers are named."""
+    found = [(line, row[1:]) for line, row in above if row and row[0].lower() == MARKERS]
+    return [(line, [f"{name} {axis}" for name in names if name for axis in "XYZ"])
+            for line, names in found[:1]]  # fmt: skip
 
 
-def _last_used(body: Rows, words: set[int]) -> tuple[int, int]:
-    """(last column that has a cell, line where it has)."""
-    best = (-1, 0)
-    for line, row in body:
-        used = (n for n in range(len(row) - 1, -1, -1) if row[n] and n not in words)
-        best = max(best, (next(used, -1), -line))
-    return best[0], -best[1]
+def _check_lengths(body: Rows, words: set[int], titles: list[str]) -> None:
+    """Refuses a row that has cells beyond the titles."""
 
+    def num_used(row: list[str]) -> int:
+        return max((n + 1 for n, cell in enumerate(row) if cell and n not in words), default=0)
 
-def _refuse_longer(path: Path, body: Rows, line: int, named: int, titles: list[str]) -> None:
-    row = next(row for number, row in body if number == line)
+    line, row = max(body, key=lambda one: (num_used(one[1]), -one[0]))
+    named = max((n + 1 for n, title in enumerate(titles) if title), default=0)
+    if num_used(row) <= named:
+        return
     hint = "give every column a title"
     if all(cell.lstrip("+-").isdigit() for cell in row if cell):
         hint = (
@@ -177,7 +168,7 @@ def _refuse_longer(path: Path, body: Rows, line: int, named: int, titles: list[s
             "semicolons between the cells"
         )
     raise InputError(
-        f"{path}: line {line}: {len(row)} cells for {named} titles ({_listed(titles)}); {hint}"
+        f"line {line}: {len(row)} cells for {named} titles ({_listed(titles)}); {hint}"
     )
 
 
@@ -202,7 +193,7 @@ def _names(rows: list[list[str]], width: int) -> list[str]:
     return [" ".join(dict.fromkeys(parts)) for parts in zip(*chosen, strict=True)]
 
 
-def _rate(above: Rows) -> float | None:
+def _frame_s(above: Rows) -> float | None:
     for _, row in above:
         if len(row) > 1 and row[0].lower().strip(":= ") in RATES and is_number(row[1]):
             rate = float(row[1].replace(",", "."))

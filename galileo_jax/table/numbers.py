@@ -7,7 +7,6 @@ standard deviation `unit in the last place / sqrt(12)`.
 import math
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -45,6 +44,16 @@ class Numbers:
     values: np.ndarray
     resolution: float
 
+    @property
+    def seen(self) -> np.ndarray:
+        """The numbers that are there, `[one]`."""
+        return self.values[np.isfinite(self.values)]
+
+    @property
+    def steps(self) -> np.ndarray:
+        """From each number that is there to the next."""
+        return np.diff(self.seen)
+
 
 def plain(cell: str) -> str:
     """A cell without typographic spaces and minus signs."""
@@ -73,7 +82,7 @@ def _grouped(text: str) -> tuple[str, str | None] | None:
     return (match[1], match[2]) if is_certain else None
 
 
-def decimal_mark(path: Path, rows: Rows, columns: dict[str, int]) -> tuple[str, str | None]:
+def decimal_mark(rows: Rows, columns: dict[str, int]) -> tuple[str, str | None]:
     """The decimal mark of all the columns, and the thousands mark, if there is one.
 
     Raises:
@@ -112,31 +121,29 @@ def decimal_mark(path: Path, rows: Rows, columns: dict[str, int]) -> tuple[str, 
     if len(marked) == 2:
         (first, one), (second, other) = marked["."], marked[","]
         raise InputError(
-            f"{path}: {second}: {other[:40]!r}, but {first}: {one[:40]!r}; "
+            f"{second}: {other[:40]!r}, but {first}: {one[:40]!r}; "
             "the same decimal mark, point or comma, in the whole file expected"
         )
     return ("," if "," in marked else "."), thousands
 
 
-def parse_columns(path: Path, rows: Rows, columns: dict[str, int]) -> dict[str, Numbers]:
+def parse_columns(rows: Rows, columns: dict[str, int]) -> dict[str, Numbers]:
     """The numbers of each of the columns, by title.
 
     Raises:
       InputError: a cell is no number, or decimal marks differ; names line, column and cell.
     """
-    decimal, thousands = decimal_mark(path, rows, columns)
-    return {title: _column(path, rows, title, at, decimal, thousands)
+    decimal, thousands = decimal_mark(rows, columns)
+    return {title: _column(rows, title, at, decimal, thousands)
             for title, at in columns.items()}  # fmt: skip
 
 
-def values_of(path: Path, rows: Rows, columns: dict[str, int]) -> dict[str, np.ndarray]:
+def values_of(rows: Rows, columns: dict[str, int]) -> dict[str, np.ndarray]:
     """The values of `parse_columns` alone, `[row]` for each title."""
-    return {title: one.values for title, one in parse_columns(path, rows, columns).items()}
+    return {title: one.values for title, one in parse_columns(rows, columns).items()}
 
 
-def _column(
-    path: Path, rows: Rows, title: str, at: int, decimal: str, thousands: str | None
-) -> Numbers:
+def _column(rows: Rows, title: str, at: int, decimal: str, thousands: str | None) -> Numbers:
     cells = _cells(rows, at)
     if decimal == "." and _are_plain(cells) and (quick := _at_once(cells)) is not None:
         return Numbers(quick, _resolution(cells, quick))
@@ -153,7 +160,7 @@ def _column(
         value = float(cell) if PLAIN.fullmatch(cell) else math.inf
         if not math.isfinite(value):
             raise InputError(
-                f"{path}: line {line}: {title}: {row[at][:40]!r} is not a number; a number such as "
+                f"line {line}: {title}: {row[at][:40]!r} is not a number; a number such as "
                 "0.125 expected; leave the cell empty where nothing was seen"
             )
         values[index], written[index] = value, cell

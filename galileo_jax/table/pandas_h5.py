@@ -31,19 +31,20 @@ def read_h5(path: Path) -> TrackTable:
       InputError: it is not what pandas writes, or a column is missing.
     """
     frames, values = _from_hdf5(path)
-    names = list(dict.fromkeys(column[1:-1] for column in values))
+    parts: dict[Column, dict[str, np.ndarray]] = {}
+    for column, numbers in values.items():
+        parts.setdefault(column[1:-1], {})[column[-1]] = numbers
     position = []
-    for name in names:
-        found = {column[-1]: values[column] for column in values if column[1:-1] == name}
+    for name, found in parts.items():
         if missing := {"x", "y", "likelihood"} - set(found):
             raise InputError(
-                f"{path}: {' '.join(name)}: no column {', '.join(sorted(missing))}; "
+                f"{' '.join(name)}: no column {', '.join(sorted(missing))}; "
                 "x, y and likelihood of every body part expected"
             )
         is_seen = found["likelihood"] >= MIN_LIKELIHOOD
         position.append(np.where(is_seen, [found["x"], found["y"]], np.nan))
     return TrackTable(
-        names=tuple(" ".join(name) for name in names),
+        names=tuple(" ".join(name) for name in parts),
         position=np.array(position),
         frames=frames,
         unit="px",
@@ -58,7 +59,7 @@ def _from_hdf5(path: Path) -> tuple[np.ndarray, dict[Column, np.ndarray]]:
         with h5py.File(path) as file:
             frame = next((group for group in file.values() if isinstance(group, h5py.Group)), None)
             if frame is None:
-                raise InputError(f"{path}: no table in it; an h5 file of DeepLabCut expected")
+                raise InputError("no table in it; an h5 file of DeepLabCut expected")
             if "table" in frame:
                 return _appendable(frame["table"])
             return _fixed(frame)
@@ -66,7 +67,7 @@ def _from_hdf5(path: Path) -> tuple[np.ndarray, dict[Column, np.ndarray]]:
         raise
     except Exception as error:  # h5py and pickle raise whatever the bytes make them
         reason = " ".join(str(error).split())[:100]
-        raise InputError(f"{path}: not an h5 file of DeepLabCut ({reason})") from None
+        raise InputError(f"not an h5 file of DeepLabCut ({reason})") from None
 
 
 def _appendable(table: Any) -> tuple[np.ndarray, dict[Column, np.ndarray]]:

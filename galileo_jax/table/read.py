@@ -3,17 +3,16 @@
 bytes -> text -> grid of cells -> titles, units, names -> roles of columns -> numbers -> table
 """
 
-import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.runtime.errors import InputError
-from galileo_jax.table.clock import UNIX_MS
+from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.columns import PLACES, Columns, with_roles
-from galileo_jax.table.grid import read_grid
-from galileo_jax.table.heading import Heading, split_heading
+from galileo_jax.table.grid import cells_of
+from galileo_jax.table.heading import split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
     motion_starts,
@@ -31,6 +30,9 @@ from galileo_jax.table.tracker_trk import is_trk, read_trk
 ONLY = "object1"
 """The name of an object whose columns have none."""
 
+UNIX_MS = (1e11, 1e14)
+"""Milliseconds since 1970 from 1973 on; no motion lasts as many."""
+
 MOST_OBJECTS = 50
 
 
@@ -45,53 +47,52 @@ def read_table(path: Path, fps: float | None = None) -> TrackTable:
       InputError: one line that names the file, the line and cell or the titles, and what would be
         right.
     """
-    content = content_of(path)
-    if is_hdf5(content):
-        return read_h5(path)
-    if is_trk(content) and not is_spreadsheet(content):
-        return read_trk(path, content)
-    heading = split_heading(path, read_grid(path).rows)
-    columns = with_roles(path, heading, fps)
-    return _table(path, heading, columns)
+    with named(path):
+        content = content_of(path)
+        if is_hdf5(content):
+            table = read_h5(path)
+        elif is_trk(content) and not is_spreadsheet(content):
+            table = read_trk(content)
+        else:
+            table = _table(with_roles(split_heading(cells_of(content)), fps))
+    return replace(table, warnings=tuple(f"{path}: {one}" for one in table.warnings))
 
 
-def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
-    lines = [line for line, _ in heading.body]
-    times, frames, resolution_s = _clock(path, heading, columns, lines)
-    names, axes, places, resolution = _places(path, heading, columns)
-    unit = _unit(path, heading, columns)
+def _table(columns: Columns) -> TrackTable:
+    lines = [line for line, _ in columns.heading.body]
+    times, frames, resolution_s = _clock(columns, lines)
+    names, axes, places, resolution = _places(columns)
+    unit = _unit(columns)
     warnings, ids = list(columns.warnings), columns.of("object")
     clock = frames if times is None else times
     if clock is not None and not ids:
-        new, said = not_pasted(path, clock, places, lines)
+        new, said = not_pasted(clock, places, lines)
         times, frames = (None if one is None else one[new] for one in (times, frames))
         places, lines = places[..., new], [lines[row] for row in new]
         warnings += said
     if ids:
         if clock is None:
-            raise InputError(
-                f"{path}: a column of particles needs one of frames or times beside it"
-            )
-        names, places, clock = _by_object(path, heading, ids[0], columns, clock, places[0])
+            raise InputError("a column of particles needs one of frames or times beside it")
+        names, places, clock = _by_object(columns, ids[0], clock, places[0])
         times, frames = (clock, None) if times is not None else (None, clock)
     elif times is not None:
         if times.size > 1 and (np.diff(times) < 0).all():
             times, places, lines = times[::-1] - times[-1], places[..., ::-1], lines[::-1]
-            warnings.append(f"{path}: the last row comes first: read from the end")
-        times, even = unrounded(path, times, places, resolution_s)
-        times, places, said = without_repeats(path, times, places, lines)
+            warnings.append("the last row comes first: read from the end")
+        times, even = unrounded(times, places, resolution_s)
+        times, places, said = without_repeats(times, places, lines)
         warnings += [*even, *said]
     elif frames is not None:
-        frames, places, said = without_repeats(path, frames, places, lines)
+        frames, places, said = without_repeats(frames, places, lines)
         warnings += said
     is_seen_by_program = bool(columns.of("likelihood"))
-    if is_seen_by_program:
-        unit = unit or "px"
+    unit = unit or ("px" if is_seen_by_program else None)
     is_counted = times is None and frames is None
     frames = np.arange(places.shape[-1], dtype=float) if is_counted else frames
-    rows = times if times is not None else frames
-    if rows is not None and not ids:
-        places, said = without_copies(path, rows, places, resolution, lines)
+    clock = frames if times is None else times
+    assert clock is not None  # frames, where there are no times
+    if not ids:
+        places, said = without_copies(clock, places, resolution, lines)
         warnings += said
     return TrackTable(
         names=names,
@@ -100,48 +101,44 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
         times_s=times,
         frames=frames,
         is_counted=is_counted,
-        frame_s=heading.frame_s,
+        frame_s=columns.heading.frame_s,
         unit=unit,
         resolution=resolution,
-        starts=motion_starts(frames if times is None else times),
+        starts=motion_starts(clock),
         y_axis="down" if unit == "px" and is_seen_by_program else None,
-        columns=tuple(
-            Column(
-                heading.name_of(n),
-                one.role if n in columns.numbers else "",
-                one.name,
-                one.unit if n in columns.numbers else None,
-                columns.numbers[n].resolution if n in columns.numbers else math.nan,
-            )
-            for n, one in enumerate(columns.meanings)
-            if heading.titles[n] or n in columns.numbers
-        ),
+        columns=_listed(columns),
         warnings=tuple(warnings),
     )
 
 
+def _listed(columns: Columns) -> tuple[Column, ...]:
+    found = []
+    for n, one in enumerate(columns.meanings):
+        title = columns.name_of(n)
+        if n in columns.numbers:
+            resolution = columns.numbers[n].resolution
+            found.append(Column(title, one.role, one.name, one.unit, resolution))
+        elif columns.heading.titles[n]:
+            found.append(Column(title, "", one.name))
+    return tuple(found)
+
+
 def _clock(
-    path: Path, heading: Heading, columns: Columns, lines: Sequence[int]
+    columns: Columns, lines: Sequence[int]
 ) -> tuple[np.ndarray | None, np.ndarray | None, float]:
     """(times in s, None, their resolution) or (None, frames, 0), `[row]`; neither: both None."""
     role = "time" if columns.of("time") else "frame"
-    found = columns.of(role)
-    if not found:
+    if not (found := columns.of(role)):
         return None, None, 0.0
-    values = columns.numbers[found[0]].values
+    values, title = columns.numbers[found[0]].values, columns.name_of(found[0])
     if np.isnan(values).any():
         at = int(np.isnan(values).argmax())
-        raise InputError(
-            f"{path}: line {lines[at]}: {heading.name_of(found[0])}: empty; a {role} in every row "
-            "expected"
-        )
+        raise InputError(f"line {lines[at]}: {title}: empty; a {role} in every row expected")
     if role == "frame":
         return None, values, 0.0
     written = columns.meanings[found[0]].unit
     if written is not None and written not in SECONDS:
-        raise InputError(
-            f"{path}: {heading.name_of(found[0])}: a time in {written}; s, ms or us expected"
-        )
+        raise InputError(f"{title}: a time in {written}; s, ms or us expected")
     per_unit = SECONDS[written] if written else 1.0
     if written is None and UNIX_MS[0] < values[0] < UNIX_MS[1]:
         per_unit = 1e-3
@@ -151,16 +148,45 @@ def _clock(
 
 
 def _places(
-    path: Path, heading: Heading, columns: Columns
+    columns: Columns,
 ) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray, tuple[float, ...]]:
     """Names, axes, `[object, axis, row]`, and the resolution of each axis."""
+    by_name = _columns_by_name(columns)
+    first_name, first = next(iter(by_name.items()))
+    axes = tuple(role for role in PLACES if role in first)
+    for name, of in by_name.items():
+        lacking = [(role, name) for role in axes if role not in of]
+        lacking += [(role, first_name) for role in of if role not in axes]
+        for role, who in lacking:
+            raise InputError(f"no column {role} of {who[:40]!r}; all objects have the same ones")
+    numbers = [[columns.numbers[of[role]] for role in axes] for of in by_name.values()]
+    places = np.array([[one.values for one in row] for row in numbers])
+    for index, name in enumerate(by_name):
+        sure = (n for n in columns.of("likelihood") if columns.meanings[n].name == name)
+        if (n := next(sure, None)) is not None:
+            places[index][:, ~(columns.numbers[n].values >= MIN_LIKELIHOOD)] = np.nan
+    if "angle" in axes:
+        unit = columns.meanings[first["angle"]].unit
+        if unit not in RADIANS:
+            raise InputError(
+                f"{columns.name_of(first['angle'])}: an angle without its unit; "
+                "write (deg) or (rad) after its title"
+            )
+        places[:, axes.index("angle")] *= RADIANS[unit]
+    places[:, :, np.isnan(places).any(axis=1).all(axis=0)] = np.nan
+    resolution = np.median([[one.resolution for one in row] for row in numbers], axis=0)
+    return tuple(name or ONLY for name in by_name), axes, places, tuple(resolution.tolist())
+
+
+def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
+    """By object, and by role, the column of each coordinate."""
     by_name: dict[str, dict[str, int]] = {}
     for role in PLACES:
         for n in columns.of(role):
             of = by_name.setdefault(columns.meanings[n].name, {})
             if role in of:
                 raise InputError(
-                    f"{path}: {heading.name_of(of[role])!r} and {heading.name_of(n)!r}: {role} is "
+                    f"{columns.name_of(of[role])!r} and {columns.name_of(n)!r}: {role} is "
                     "given twice; keep one, or name the objects, such as x 1 and x 2"
                 )
             of[role] = n
@@ -170,73 +196,31 @@ def _places(
         if {"x", "y"} & set(of):
             of.pop("line", None)
             of.pop("angle", None)
-    first = next(iter(by_name.values()))
-    axes = tuple(role for role in PLACES if role in first)
-    for name, of in by_name.items():
-        missing = next((role for role in axes if role not in of), None) or next(
-            (role for role in of if role not in axes), None
-        )
-        if missing:
-            lacking = name if missing not in of else next(iter(by_name))
-            raise InputError(
-                f"{path}: no column {missing} of {lacking[:40]!r}; all objects have the same ones"
-            )
-    places = np.array(
-        [[columns.numbers[of[role]].values for role in axes] for of in by_name.values()]
-    )
-    for index, name in enumerate(by_name):
-        sure = [n for n in columns.of("likelihood") if columns.meanings[n].name == name]
-        if sure:
-            likelihood = columns.numbers[sure[0]].values
-            places[index][:, ~(likelihood >= MIN_LIKELIHOOD)] = np.nan
-    if "angle" in axes:
-        unit = columns.meanings[first["angle"]].unit
-        if unit not in RADIANS:
-            raise InputError(
-                f"{path}: {heading.name_of(first['angle'])}: an angle without its unit; "
-                "write (deg) or (rad) after its title"
-            )
-        places[:, axes.index("angle")] *= RADIANS[unit]
-    places[:, :, np.isnan(places).any(axis=1).all(axis=0)] = np.nan
-    resolution = [
-        float(np.median([columns.numbers[of[role]].resolution for of in by_name.values()]))
-        for role in axes
-    ]
-    return tuple(name or ONLY for name in by_name), axes, places, tuple(resolution)
+    return by_name
 
 
-def _unit(path: Path, heading: Heading, columns: Columns) -> str | None:
+def _unit(columns: Columns) -> str | None:
     """The unit of length; None where no title has one."""
-    written = {
-        columns.meanings[n].unit for role in ("x", "y", "z", "line") for n in columns.of(role)
-    }
+    places = [n for role in ("x", "y", "z", "line") for n in columns.of(role)]
+    written = {columns.meanings[n].unit for n in places}
     known = {LENGTHS.get(unit, unit) if unit else None for unit in written}
     if len(known) > 1:
-        raise InputError(
-            f"{path}: the columns x and y are in different units: "
-            f"{', '.join(sorted(unit or 'none' for unit in known))}"
-        )
+        units = ", ".join(sorted(unit or "none" for unit in known))
+        raise InputError(f"the columns x and y are in different units: {units}")
     unit = known.pop() if known else None
     if unit is not None and unit not in LENGTHS.values():
-        raise InputError(
-            f"{path}: places in {unit}; {', '.join(sorted(set(LENGTHS.values())))} expected"
-        )
+        raise InputError(f"places in {unit}; {', '.join(sorted(set(LENGTHS.values())))} expected")
     return unit
 
 
 def _by_object(
-    path: Path,
-    heading: Heading,
-    at: int,
-    columns: Columns,
-    clock: np.ndarray,
-    places: np.ndarray,
+    columns: Columns, at: int, clock: np.ndarray, places: np.ndarray
 ) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """A table with a row for each object and frame as one with a row for each frame."""
     ids, which = np.unique(columns.numbers[at].values, return_inverse=True)
     if len(ids) > MOST_OBJECTS:
         raise InputError(
-            f"{path}: {heading.name_of(at)}: {len(ids)} particles; keep the rows of those that are "
+            f"{columns.name_of(at)}: {len(ids)} particles; keep the rows of those that are "
             f"meant, at most {MOST_OBJECTS}"
         )
     times, row = np.unique(clock, return_inverse=True)
@@ -244,7 +228,7 @@ def _by_object(
     found[which, :, row] = places.T
     if len(set(zip(which.tolist(), row.tolist(), strict=True))) < len(row):
         raise InputError(
-            f"{path}: {heading.name_of(at)}: the same particle twice at one time; one row for each "
+            f"{columns.name_of(at)}: the same particle twice at one time; one row for each "
             "particle and frame expected"
         )
     return tuple(f"{one:g}" for one in ids), found, times

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -23,13 +22,11 @@ GOES_ON = 0.75
 """Of a step: a body goes on so far in a row, or it begins, ends or turns there by itself."""
 
 
-def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
+def motion_starts(clock: np.ndarray) -> tuple[int, ...]:
     """The rows at which motions begin: the first, and those where a clock falls back to its start.
 
     The first alone where a time goes back in any other way, which is for others to refuse.
     """
-    if clock is None:
-        return (0,)
     starts = [0, *(1 + np.flatnonzero(np.diff(clock) < 0)).tolist()]
     ends = [*starts[1:], len(clock)]
     is_whole = all(end - start >= LEAST_ROWS for start, end in zip(starts, ends, strict=True))
@@ -43,7 +40,7 @@ def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
 
 
 def unrounded(
-    path: Path, times: np.ndarray, places: np.ndarray, resolution_s: float
+    times: np.ndarray, places: np.ndarray, resolution_s: float
 ) -> tuple[np.ndarray, list[str]]:
     """Times `[row]` that are printed more coarsely than rows follow each other, and what was done.
 
@@ -66,14 +63,14 @@ def unrounded(
         return times, []
     step = agrees[0]
     said = (
-        f"{path}: times in steps of {resolution_s:g} s stand in several rows; even steps of "
+        f"times in steps of {resolution_s:g} s stand in several rows; even steps of "
         f"{step:.3g} s agree with all of them and are used"
     )
     return step * rows, [said]
 
 
 def without_repeats(
-    path: Path, times: np.ndarray, places: np.ndarray, lines: Sequence[int]
+    times: np.ndarray, places: np.ndarray, lines: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Times `[row]` and places `[object, axis, row]` with each time once, and what was done.
 
@@ -97,12 +94,12 @@ def without_repeats(
         if num_mixed
         else "with the same places, which count once"
     )
-    said = f"{path}: line {first}: {int(repeats.sum())} times stand in several rows, {how}"
+    said = f"line {first}: {int(repeats.sum())} times stand in several rows, {how}"
     return times[starts], mean, [said]
 
 
 def not_pasted(
-    path: Path, clock: np.ndarray, places: np.ndarray, lines: Sequence[int]
+    clock: np.ndarray, places: np.ndarray, lines: Sequence[int]
 ) -> tuple[np.ndarray, list[str]]:
     """The rows that are in a table for the first time, counted from 0, and what was done.
 
@@ -121,11 +118,10 @@ def not_pasted(
     if is_new.all():
         return new, []
     first, count = lines[int(is_new.argmin())], len(clock) - len(new)
-    return new, [f"{path}: line {first}: {count} rows are rows of before once more; left out"]
+    return new, [f"line {first}: {count} rows are rows of before once more; left out"]
 
 
 def without_copies(
-    path: Path,
     clock: np.ndarray,
     places: np.ndarray,
     resolution: Sequence[float],
@@ -139,7 +135,6 @@ def without_copies(
     two and not to the other.
 
     Args:
-      path: named in what is said.
       clock: `[row]`, rising.
       places: in any unit.
       resolution: of each axis.
@@ -156,7 +151,7 @@ def without_copies(
     listed = ", ".join(f"line {lines[row]}" for row in rows[:5])
     more = f" and {rows.size - 5} more" if rows.size > 5 else ""
     said = (
-        f"{path}: {listed}{more}: the place of the row beside it, to the last digit, while it "
+        f"{listed}{more}: the place of the row beside it, to the last digit, while it "
         "moves: a copy, which counts as not seen"
     )
     return found, [said]

@@ -8,11 +8,12 @@ the process it runs in; so that process is a child, with little memory and time.
 
 import io
 import json
+import os
 import subprocess
 import sys
 import zipfile
+from contextlib import suppress
 from datetime import date, datetime, time, timedelta
-from pathlib import Path
 from typing import Any
 
 from galileo_jax.runtime.errors import InputError
@@ -38,49 +39,33 @@ def is_spreadsheet(content: bytes) -> bool:
     return any(name.startswith("xl/") or name == "content.xml" for name in names)
 
 
-def spreadsheet_rows(path: Path, content: bytes) -> Rows:
+def spreadsheet_rows(content: bytes) -> Rows:
     """The rows that are not blank of the first sheet that has numbers, each with its number.
 
     Raises:
       InputError: it cannot be read within `MAX_BYTES` of memory and `MAX_SECONDS`, or is empty.
     """
     command = [sys.executable, "-m", "galileo_jax.table.spreadsheet"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
         done = subprocess.run(
-            command, input=content, capture_output=True, timeout=MAX_SECONDS, check=False,
-            env=_environment(),
-        )  # fmt: skip
+            command, input=content, capture_output=True, timeout=MAX_SECONDS, env=environment
+        )
     except subprocess.TimeoutExpired:
-        raise InputError(f"{path}: a spreadsheet that takes too long; {WANTED}") from None
+        raise InputError(f"a spreadsheet that takes too long; {WANTED}") from None
     if done.returncode:
-        raise InputError(f"{path}: not a whole spreadsheet, or far too large a one; {WANTED}")
+        raise InputError(f"not a whole spreadsheet, or far too large a one; {WANTED}")
     rows = [(int(line), [str(cell) for cell in row]) for line, row in json.loads(done.stdout)]
     if not rows:
-        raise InputError(f"{path}: a spreadsheet without rows; time and place in columns expected")
+        raise InputError("a spreadsheet without rows; time and place in columns expected")
     if len(rows) > MAX_ROWS:
-        raise InputError(f"{path}: {len(rows)} rows; at most {MAX_ROWS} expected")
+        raise InputError(f"{len(rows)} rows; at most {MAX_ROWS} expected")
     return rows
-
-
-def _environment() -> dict[str, str]:
-    import os
-
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-
-
-def _limit() -> None:
-    try:
-        import resource
-    except ImportError:  # Windows: the parent's time limit is left
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
 
 
 def _written(value: Any) -> str:
     match value:
-        case bool():
-            return str(value)
-        case float() | int():
+        case float() | int() if not isinstance(value, bool):
             return repr(int(value) if float(value).is_integer() and abs(value) < 1e15 else value)
         case datetime() | date() | time():
             return value.isoformat()
@@ -92,7 +77,10 @@ def _written(value: Any) -> str:
 def _main() -> None:
     from python_calamine import load_workbook
 
-    _limit()
+    with suppress(ImportError):  # Windows: the parent's time limit is left
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
     book = load_workbook(io.BytesIO(sys.stdin.buffer.read()))
     found: list[tuple[int, list[str]]] = []
     for name in book.sheet_names:

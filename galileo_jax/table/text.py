@@ -6,10 +6,10 @@ places and units do. Digits and separators are the same in all of them.
 """
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.titles import count_words
 
 MAX_BYTES = 64_000_000
 """About a million rows of six numbers."""
@@ -39,25 +39,18 @@ def content_of(path: Path) -> bytes:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
+        raise InputError("no such file") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"cannot be read: {error.strerror}") from None
     if len(content) > MAX_BYTES:
-        raise InputError(
-            f"{path}: larger than {MAX_BYTES // 1_000_000} MB; a table of one motion expected"
-        )
+        raise InputError(f"larger than {MAX_BYTES // 1_000_000} MB; a table of one motion expected")
     if not content.strip(b" \t\r\n\0"):
-        raise InputError(f"{path}: empty; a row of titles and numbers expected")
+        raise InputError("empty; a row of titles and numbers expected")
     return content
 
 
-def decoded(path: Path, content: bytes, count_words: Callable[[str], int]) -> str:
-    """The text of a file.
-
-    Args:
-      path: named in errors.
-      content: all of it.
-      count_words: how many words of a text are known; the more, the better its encoding.
+def decoded(content: bytes) -> str:
+    """The text of a file: of the encodings of old systems the one in which most words are known.
 
     Raises:
       InputError: it is no text.
@@ -66,9 +59,9 @@ def decoded(path: Path, content: bytes, count_words: Callable[[str], int]) -> st
         if content.startswith(mark):
             return content.decode(encoding, errors="replace")
     if b"\0" in content:
-        return _without_mark(path, content)
+        return _without_mark(content)
     try:
-        return _text(path, content.decode("utf-8"))
+        return _text(content.decode("utf-8"))
     except UnicodeDecodeError:
         pass
     head = content[:HEAD_BYTES].rpartition(b"\n")[0] or content[:HEAD_BYTES]
@@ -82,21 +75,21 @@ def decoded(path: Path, content: bytes, count_words: Callable[[str], int]) -> st
         share = sum(map(str.isalpha, beyond)) / len(beyond) if beyond else 0.0
         if (found := (count_words(text), share)) > most:
             best, most = encoding, found
-    return _text(path, content.decode(best, errors="replace"))
+    return _text(content.decode(best, errors="replace"))
 
 
-def _without_mark(path: Path, content: bytes) -> str:
+def _without_mark(content: bytes) -> str:
     """UTF-16 without its mark: every second byte of digits is 0."""
     even, odd = content[0:HEAD_BYTES:2], content[1:HEAD_BYTES:2]
     for encoding, nulls, other in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
         if nulls.count(0) > 0.8 * len(nulls) and other.count(0) < 0.1 * len(other):
             return content.decode(encoding, errors="replace")
-    raise InputError(f"{path}: not a text: a byte 0 at {content.index(0)}; a table expected")
+    raise InputError(f"not a text: a byte 0 at {content.index(0)}; a table expected")
 
 
-def _text(path: Path, text: str) -> str:
+def _text(text: str) -> str:
     """The text, unless it is full of what no table has."""
     strange = re.findall(r"[\x01-\x08\x0e-\x1a\x1c-\x1f\x7f]", text[:HEAD_BYTES])
     if len(strange) > 0.02 * len(text[:HEAD_BYTES]):
-        raise InputError(f"{path}: not a text, full of control characters; a table expected")
+        raise InputError("not a text, full of control characters; a table expected")
     return text

@@ -14,7 +14,6 @@ import io
 import math
 import re
 import zipfile
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -37,30 +36,30 @@ def is_trk(content: bytes) -> bool:
     return start.startswith((b"<?xml", b"<object", b"<!DOCTYPE", b"PK\x03\x04"))
 
 
-def read_trk(path: Path, content: bytes) -> TrackTable:
+def read_trk(content: bytes) -> TrackTable:
     """The marks of all point masses, in pixels, with the calibration."""
-    panel = _panel(path, content)
+    panel = _panel(content)
     masses = [
         item
         for item in panel.findall("property[@name='tracks']/property/object")
         if item.get("class") == POINT_MASS
     ]
-    marks = {_text(mass, "name") or f"mass {n + 1}": _marks(path, mass)
+    marks = {_text(mass, "name") or f"mass {n + 1}": _marks(mass)
              for n, mass in enumerate(masses)}  # fmt: skip
     marks = {name: by_frame for name, by_frame in marks.items() if by_frame}
     if not marks:
-        raise InputError(f"{path}: no point mass with marks; track an object in Tracker first")
+        raise InputError("no point mass with marks; track an object in Tracker first")
     frames = np.array(sorted(set().union(*marks.values())))
     position = np.full((len(marks), 2, len(frames)), np.nan)
     for index, by_frame in enumerate(marks.values()):
         at = np.searchsorted(frames, list(by_frame))
         position[index][:, at] = np.array(list(by_frame.values())).T
-    calibration, warnings = _calibration(path, panel)
+    calibration, warnings = _calibration(panel)
     return TrackTable(
         names=tuple(marks),
         position=position,
         frames=frames,
-        frame_s=_frame_s(path, panel),
+        frame_s=_frame_s(panel),
         unit="px",
         y_axis="down",
         calibration=calibration,
@@ -68,39 +67,39 @@ def read_trk(path: Path, content: bytes) -> TrackTable:
     )
 
 
-def _panel(path: Path, content: bytes) -> ElementTree.Element:
+def _panel(content: bytes) -> ElementTree.Element:
     """The root of the XML, of one tab of Tracker."""
-    content = _unpacked(path, content)
+    content = _unpacked(content)
     if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: larger than {MAX_BYTES} bytes; a Tracker file expected")
+        raise InputError(f"larger than {MAX_BYTES} bytes; a Tracker file expected")
     if b"<!ENTITY" in content:
-        raise InputError(f"{path}: XML with entities; a file saved by Tracker has none")
+        raise InputError("XML with entities; a file saved by Tracker has none")
     try:
         root = ElementTree.fromstring(content)
     except ElementTree.ParseError as error:
-        raise InputError(f"{path}: not whole XML ({error}); save it again in Tracker") from None
+        raise InputError(f"not whole XML ({error}); save it again in Tracker") from None
     kind = root.get("class") or root.tag
     if kind != PANEL:
         wanted = "a tab (TrackerPanel) saved with File | Save Tab expected"
-        raise InputError(f"{path}: holds {kind.rsplit('.', 1)[-1][:40]}; {wanted}")
+        raise InputError(f"holds {kind.rsplit('.', 1)[-1][:40]}; {wanted}")
     return root
 
 
-def _unpacked(path: Path, content: bytes) -> bytes:
+def _unpacked(content: bytes) -> bytes:
     if not content.startswith(b"PK"):
         return content
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             tabs = [info for info in archive.infolist() if info.filename.endswith(".trk")]
             if len(tabs) != 1:
-                raise InputError(f"{path}: {len(tabs)} .trk files in the archive; one expected")
+                raise InputError(f"{len(tabs)} .trk files in the archive; one expected")
             with archive.open(tabs[0]) as file:
                 return file.read(MAX_BYTES + 1)
     except (zipfile.BadZipFile, RuntimeError, NotImplementedError) as error:
-        raise InputError(f"{path}: not a whole Tracker project ({error})") from None
+        raise InputError(f"not a whole Tracker project ({error})") from None
 
 
-def _marks(path: Path, mass: ElementTree.Element) -> dict[int, tuple[float, float]]:
+def _marks(mass: ElementTree.Element) -> dict[int, tuple[float, float]]:
     """Frame number to (x, y), pixels."""
     marks = {}
     for entry in mass.findall("property[@name='framedata']/property"):
@@ -109,27 +108,25 @@ def _marks(path: Path, mass: ElementTree.Element) -> dict[int, tuple[float, floa
         if index is None or point is None:
             continue
         where = f"{_text(mass, 'name')}, frame {index[1]}"
-        marks[int(index[1])] = (_number(path, point, "x", where), _number(path, point, "y", where))
+        marks[int(index[1])] = (_number(point, "x", where), _number(point, "y", where))
     return marks
 
 
-def _calibration(
-    path: Path, panel: ElementTree.Element
-) -> tuple[Calibration | None, tuple[str, ...]]:
+def _calibration(panel: ElementTree.Element) -> tuple[Calibration | None, tuple[str, ...]]:
     coords = panel.find("property[@name='coords']/object")
     entries = [] if coords is None else coords.findall("property[@name='framedata']//object")
     if not entries:
         return None, ()
     keys = ("xorigin", "yorigin", "angle", "xscale", "yscale")
-    values = [[_number(path, entry, key, "coords") for key in keys] for entry in entries]
+    values = [[_number(entry, key, "coords") for key in keys] for entry in entries]
     if np.ptp(np.array(values), axis=0).max() > 1e-6:
         raise InputError(
-            f"{path}: its coordinate system moves with the frames; "
+            "its coordinate system moves with the frames; "
             "export the track as text (File | Export | Data) and give that"
         )
     x, y, angle_deg, *scales = values[0]
     if min(scales) <= 0:
-        raise InputError(f"{path}: coords: a scale of {min(scales):g} pixels; above 0 expected")
+        raise InputError(f"coords: a scale of {min(scales):g} pixels; above 0 expected")
     unit = LENGTHS.get((_text(panel, "length_unit") or "").strip().lower())
     turned_deg = (angle_deg + 45) % 90 - 45
     is_level = abs(turned_deg) <= MAX_ROLL_DEG
@@ -140,9 +137,7 @@ def _calibration(
             if is_level
             else "laid along a slope: the picture's own vertical is used"
         )
-        warnings = (
-            f"{path}: its axes are turned by {angle_deg:.2f} degrees; interpreted as {taken}",
-        )
+        warnings = (f"its axes are turned by {angle_deg:.2f} degrees; interpreted as {taken}",)
     is_calibrated = scales != [1.0, 1.0]
     if not is_calibrated:
         scales, unit = [math.nan, math.nan], None
@@ -157,7 +152,7 @@ def _calibration(
     )
 
 
-def _frame_s(path: Path, panel: ElementTree.Element) -> float | None:
+def _frame_s(panel: ElementTree.Element) -> float | None:
     """Between two frames; Tracker writes it in ms, the clip control's being what it uses."""
     for place in (
         "property[@name='clipcontrol']/object",
@@ -165,9 +160,9 @@ def _frame_s(path: Path, panel: ElementTree.Element) -> float | None:
     ):
         owner = panel.find(place)
         if owner is not None and _text(owner, "delta_t") is not None:
-            step_ms = _number(path, owner, "delta_t", "clipcontrol")
+            step_ms = _number(owner, "delta_t", "clipcontrol")
             if not 0.001 <= step_ms <= 1e5:
-                raise InputError(f"{path}: delta_t: {step_ms:g} ms between frames cannot be")
+                raise InputError(f"delta_t: {step_ms:g} ms between frames cannot be")
             return step_ms / 1000
     return None
 
@@ -177,7 +172,7 @@ def _text(owner: ElementTree.Element, name: str) -> str | None:
     return None if found is None else found.text
 
 
-def _number(path: Path, owner: ElementTree.Element, name: str, where: str) -> float:
+def _number(owner: ElementTree.Element, name: str, where: str) -> float:
     text = _text(owner, name)
     try:
         value = float(text or "")
@@ -185,5 +180,5 @@ def _number(path: Path, owner: ElementTree.Element, name: str, where: str) -> fl
         value = math.nan
     if not math.isfinite(value):
         problem = "missing" if text is None else f"{text[:40]!r} is not a number"
-        raise InputError(f"{path}: {where}: {name}: {problem}")
+        raise InputError(f"{where}: {name}: {problem}")
     return value

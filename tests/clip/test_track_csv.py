@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.plane_noise import MIN_SD_M, position_noise_m
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
+from galileo_jax.clip.track_noise import MIN_SD_M, position_noise_m
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
