@@ -20,6 +20,7 @@ from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.observation.observation import Observation
+from galileo_jax.similarity.gaussian_likelihood import is_measured
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
@@ -115,7 +116,7 @@ def _errors(
 ) -> np.ndarray:
     """Whitened errors of a clip, `[replicate, value]`: the tracker's, and modes of a size.
 
-    0 where nothing was seen.
+    0 where nothing was measured.
     """
     data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
@@ -132,8 +133,7 @@ def _errors(
     own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
     found = found + ((own + along / noise_scale) * left - own) @ basis
-    seen = problem.observation
-    return found * np.repeat(seen.mask[:, None], seen.position_m.shape[1], axis=1).reshape(-1)
+    return found * is_measured(data.inverse_root).reshape(-1)
 
 
 def _uneven(

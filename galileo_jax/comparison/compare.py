@@ -28,7 +28,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.model.parameters import prior_deviations
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening, is_measured
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
 
 NUM_REPLICATES = 200
@@ -183,7 +183,9 @@ def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarra
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
         seen = problem.observation
         absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
-        every = find_cells(clip, seen.names, seen.mask, label, seen.axes)
+        every = find_cells(
+            clip, seen.names, is_measured(problem.data.inverse_root), label, seen.axes
+        )
         found += [cell for cell in every if absorbed[cell.index].mean() < ABSORBED]
     return found
 
@@ -267,12 +269,12 @@ def _place(
     i, a = observation.names.index(cell.object), observation.axes.index(cell.axis)
     frames = len(observation.times_s)
     index = cell.index % frames
-    predicted = problem.simulate(trials.of_clip(theta, cell.clip))[i, a]
-    residual = (observation.position_m[i, a] - predicted)[index]
+    predicted = problem.simulate(trials.of_clip(theta, cell.clip))
+    residual = observation.measured_part(observation.position_m - predicted)[i, a, index]
     follows = np.diff(index) == 1
     dt = np.diff(observation.times_s[index])[follows]
     speed = np.diff(residual)[follows] / dt
-    variance = observation.covariance_m2[i, a, a, index]
+    variance = observation.measured_variance_m2[i, a, index]
     noise = (variance[1:] + variance[:-1])[follows] / dt**2
     left = white[cell.clip][cell.index]
     neighbours = float(np.sum(left[1:] * left[:-1]) / max(np.sum(left**2), 1e-12))

@@ -42,21 +42,22 @@ class Cell:
 def find_cells(
     clip: int,
     names: Sequence[str],
-    mask: np.ndarray,
+    measured: np.ndarray,
     labels: np.ndarray,
     axes: Sequence[str] = AXES,
 ) -> list[Cell]:
     """The cells of one clip with enough frames.
 
-    `mask` and `labels` (indices into `PHASES`) are `[object, frame]`.
+    `measured`, where there is a whitened residual (`is_measured`), is `[object, axis, frame]`,
+    `labels` (indices into `PHASES`) `[object, frame]`.
     """
-    frames = mask.shape[1]
+    frames = measured.shape[-1]
     found = []
     for i, name in enumerate(names):
         for a, axis in enumerate(axes):
             first = (i * len(axes) + a) * frames
             for phase in (*PHASES, WHOLE):
-                chosen = mask[i] & (
+                chosen = measured[i, a] & (
                     np.ones(frames, bool) if phase == WHOLE else labels[i] == PHASES.index(phase)
                 )
                 index = first + np.flatnonzero(chosen)

@@ -57,7 +57,8 @@ def without_a_name(
 
     None is missing where imperfections of usual sizes leave nothing but noise and no effect beside
     them is ahead by `DECISIVE`: the exact model was contradicted, and that sizes found in the data
-    leave only noise speaks less for it than a test that it passes without them (`CONVINCING`). The
+    leave only noise speaks less for it than a test that it passes without them (`CONVINCING`). A
+    form without a name, which stands for anything smooth, as imperfections do, has to convince. The
     friction is uneven where it varies by more and no effect, with imperfections of usual sizes,
     explains the data about as well; ambiguous where one does. A formula has to be better than
     imperfections are. What would have to push is no friction.
@@ -70,8 +71,7 @@ def without_a_name(
     if comparison.p_value < ADEQUATE_P:
         return None
     explaining = [c for c in candidates if explains(c)]
-    lead = max((c.log_odds for c in explaining), default=-np.inf)
-    if lead >= DECISIVE:
+    if any(c.log_odds >= (CONVINCING if c.is_form else DECISIVE) for c in explaining):
         return None
     why = (reasons.imperfections_explain(comparison, DECISIVE),)
     if not comparison.unusual:

@@ -261,8 +261,8 @@ class Problem:
         patterns = np.concatenate(own)
         left = whose.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
         white = np.tensordot(patterns.reshape(len(patterns), -1) @ left, patterns, 1)
-        root = np.where(self.observation.mask[:, None, None], self._inverse_root, 0.0)
-        root = np.linalg.pinv(np.moveaxis(root, -1, 1))  # [object, frame, axis, axis]
+        # [object, frame, axis, axis]
+        root = np.linalg.pinv(np.moveaxis(self._inverse_root, -1, 1))
         return predicted_m + np.einsum("otij,ojt->oit", root, white)
 
     @cached_property

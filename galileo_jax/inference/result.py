@@ -63,12 +63,9 @@ def velocity_error(
         observation = problem.observation
         dt = np.diff(observation.times_s)
         both = observation.mask[:, 1:] & observation.mask[:, :-1]
-        across = observation.across
-        measured = np.eye(across.shape[1])[:, :, None] - across[:, :, None] * across[:, None]
-        left = np.einsum("oabt,obt->oat", measured, observation.position_m - predicted)
-        residual = np.diff(left, axis=-1) / dt
+        left = observation.measured_part(observation.position_m - predicted)
+        residual, variance = np.diff(left, axis=-1) / dt, observation.measured_variance_m2
         both = np.broadcast_to(both[:, None], residual.shape)
-        variance = np.einsum("oabt,obct,oact->oat", measured, observation.covariance_m2, measured)
         if observation.is_turning:  # radians are no metres
             residual, variance, both = residual[:, :2], variance[:, :2], both[:, :2]
         residuals.append(residual[both])
@@ -103,12 +100,11 @@ def distance_error(
         seen = problem.observation
         axes = 2 if seen.is_turning else predicted.shape[1]
         fitted = predicted + seen.offset_m(predicted)[..., None]
-        every = zip(seen.mask, seen.position_m, fitted, seen.across, strict=True)
-        for mask, place, own, across in every:
+        away = seen.measured_part(seen.position_m[:, : predicted.shape[1]] - fitted)
+        for mask, left, own in zip(seen.mask, away[:, :axes], fitted[:, :axes], strict=True):
             if mask.any():
-                away, own = (place - own)[:axes, mask], own[:axes, mask]
-                away -= across[:axes, mask] * np.sum(across[:axes, mask] * away, axis=0)
-                squares.append(np.sum(away**2, axis=0))
+                own = own[:, mask]
+                squares.append(np.sum(left[:, mask] ** 2, axis=0))
                 way_m = max(way_m, float(np.linalg.norm(np.ptp(own, axis=1))))
     of_all = np.concatenate(squares)
     rms_m = float(np.sqrt(np.mean(of_all))) if of_all.size else math.nan

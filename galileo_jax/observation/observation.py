@@ -121,6 +121,28 @@ class Observation:
         return found
 
     @property
+    def _measured(self) -> Float[np.ndarray, "object axis axis frame"]:
+        """Projections 1 - e e^T on what was measured, e being `across`."""
+        across = self.across
+        return np.eye(across.shape[1])[:, :, None] - across[:, :, None] * across[:, None]
+
+    def measured_part(
+        self, difference_m: Float[np.ndarray, "object axis frame"]
+    ) -> Float[np.ndarray, "object axis frame"]:
+        """A difference without what lies along directions in which nothing was measured, m.
+
+        It may have the first of the axes alone.
+        """
+        axes = difference_m.shape[1]
+        return np.einsum("oabt,obt->oat", self._measured[:, :axes, :axes], difference_m)
+
+    @property
+    def measured_variance_m2(self) -> Float[np.ndarray, "object axis frame"]:
+        """The variance of each coordinate of `measured_part` of the tracking errors, m^2."""
+        own = self._measured
+        return np.einsum("oabt,obct,oact->oat", own, self.covariance_m2, own)
+
+    @property
     def variance_m2(self) -> Float[np.ndarray, "object frame"]:
         """The mean variance of a coordinate of place that was measured, m^2; NaN where none was."""
         axes = 2 if self.is_turning else self.position_m.shape[1]

@@ -75,8 +75,5 @@ def noise_sd_m(data: Whitening) -> Float[np.ndarray, "object axis frame"]:
 
 
 def _root(data: Whitening) -> np.ndarray:
-    """L of the tracker's covariance L L^T, `[object, 2, 2, frame]`; 0 where masked."""
-    inverse = np.moveaxis(data.inverse_root, -1, 1)
-    is_seen = np.abs(inverse).sum(axis=(2, 3)) > 0
-    root = np.linalg.inv(np.where(is_seen[..., None, None], inverse, np.eye(inverse.shape[-1])))
-    return np.moveaxis(root * is_seen[..., None, None], 1, -1)
+    """L of the tracker's covariance L L^T, `[object, 2, 2, frame]`; 0 where nothing is measured."""
+    return np.moveaxis(np.linalg.pinv(np.moveaxis(data.inverse_root, -1, 1)), 1, -1)

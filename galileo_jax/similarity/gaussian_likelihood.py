@@ -38,7 +38,7 @@ class Whitening(NamedTuple):
 
     Attributes:
       observed_m: `[object, 2, frame]`, 0 where masked.
-      inverse_root: `[object, 2, 2, frame]`, L^-1; 0 where masked.
+      inverse_root: `[object, 2, 2, frame]`, L^-1; 0 where masked (`inverse_root_of`).
       basis: `[mode, object, 2, frame]`, orthonormal.
       gain: `[mode]`.
       num_values: how many numbers were measured.
@@ -160,12 +160,28 @@ class GaussianLikelihood:
 
 
 def inverse_root_of(observation: Observation) -> Float[np.ndarray, "object axis axis frame"]:
-    """L^-1 of the tracker's covariance L L^T of each frame; 0 where masked."""
+    """R with R^T R = C^-1 of the tracker's covariance C of each frame, 1/m; 0 where masked.
+
+    L^-1 of C = L L^T. Of a place that is known along a unit vector e only, by sd s, the first row
+    is e / s and the other 0: there is no second number, and none is fitted, counted or drawn.
+    """
     mask, axes = observation.mask, observation.position_m.shape[1]
     covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
     covariance[~mask] = np.eye(axes)
     inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
+    across = observation.across
+    is_line = (across != 0).any(axis=1)
+    line = np.stack([-across[:, 1], across[:, 0]], axis=-1)[is_line]
+    inverse_root[is_line] = 0.0
+    inverse_root[is_line, 0] = line / np.sqrt(observation.variance_m2[is_line])[:, None]
     return np.moveaxis(inverse_root, 1, -1)
+
+
+def is_measured(
+    inverse_root: Float[np.ndarray, "object axis axis frame"],
+) -> Bool[np.ndarray, "object axis frame"]:
+    """Which whitened numbers there are: none where nothing was seen, one of a place on a line."""
+    return (inverse_root != 0).any(axis=2)
 
 
 def white_patterns(
@@ -196,44 +212,21 @@ def fixed_patterns(
     return patterns
 
 
-def known_lines(
-    observation: Observation, inverse_root: Float[np.ndarray, "object axis axis frame"]
-) -> tuple[Bool[np.ndarray, "object frame"], Float[np.ndarray, "object axis frame"]]:
-    """Where places are known along a line only, and its direction in the stated errors.
-
-    Returns:
-      `[object, frame]`; and unit vectors `[object, axis, frame]`, 0 elsewhere.
-    """
-    across = observation.across
-    is_line = (across != 0).any(axis=1)
-    if not is_line.any():
-        return is_line, np.zeros_like(observation.position_m)
-    line = np.stack([-across[:, 1], across[:, 0]], axis=1)
-    white = np.einsum("oijt,ojt->oit", inverse_root, line)
-    length = np.linalg.norm(white, axis=1, keepdims=True)
-    return is_line, np.divide(white, length, out=np.zeros_like(white), where=length > 0)
-
-
 def whitening_of(
     observation: Observation,
     inverse_root: Float[np.ndarray, "object axis axis frame"],
     patterns: Float[np.ndarray, "pattern object axis frame"],
 ) -> Whitening:
     """The covariance of the tracker's errors and of patterns in units of them, decomposed."""
-    mask, axes = observation.mask, observation.position_m.shape[1]
-    is_line, along = known_lines(observation, inverse_root)
-    if is_line.any():  # across a line nothing is measured, and no mode is told
-        told = np.einsum("moit,oit->mot", patterns, along)[:, :, None] * along
-        patterns = np.where(is_line[:, None], told, patterns)
     flat = patterns.reshape(len(patterns), -1)
     gain, basis = principal_modes(flat)
     gain, basis = gain[gain > IDLE], basis[gain > IDLE]  # many patterns are alike
     return Whitening(
-        np.where(mask[:, None], observation.position_m, 0.0),
+        np.where(observation.mask[:, None], observation.position_m, 0.0),
         inverse_root,
         basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
         gain,
-        np.float64(axes * mask.sum() - (observation.across != 0).any(axis=1).sum()),
+        np.float64(is_measured(inverse_root).sum()),
     )
 
 

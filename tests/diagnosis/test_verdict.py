@@ -651,6 +651,14 @@ def test_imperfections_explain_where_no_effect_beside_them_is_ahead(
         )
 
 
+@pytest.mark.parametrize(("best", "status"), [(7 - EDGE, "none"), (7 + EDGE, None)])
+def test_a_form_beside_usual_imperfections_has_to_convince(best, status):
+    """It stands for anything smooth, and so do they."""
+    found = Comparison(0.5, (), (), {}, (), (), (1.0,), False)
+    verdict = without_a_name(found, [candidate(FORM, best)])
+    assert (None if verdict is None else verdict.status) == status
+
+
 def test_friction_that_would_push_is_no_uneven_friction():
     found = Comparison(0.5, (), (), {}, (), (), (1.0,), False, ("friction_roughness",))
     assert without_a_name(found, [candidate("air_drag", -9.0)], is_friction=False) is None

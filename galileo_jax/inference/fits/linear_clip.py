@@ -34,7 +34,7 @@ from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.resampled import resampled
-from galileo_jax.similarity.gaussian_likelihood import known_lines
+from galileo_jax.similarity.gaussian_likelihood import is_measured
 from galileo_jax.statespace.sizes import Sizes
 from galileo_jax.statespace.term import Term
 
@@ -129,14 +129,7 @@ def averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row val
       values: `[row, ...]`, whitened, as many in each row as `Problem.whiten` gives.
       problem: a place that is known along a line only is one value, not two.
     """
-    observation = problem.observation
-    seen = np.repeat(observation.mask[:, None], observation.position_m.shape[1], axis=1)
-    is_line, along = known_lines(observation, problem.data.inverse_root)
-    if is_line.any():
-        values = values.reshape(len(values), *observation.position_m.shape).copy()
-        told = np.einsum("roit,oit->rot", values, along)
-        values[:, :, 0] = np.where(is_line, told, values[:, :, 0])
-        seen[:, 1] &= ~is_line
+    seen = is_measured(problem.data.inverse_root)
     own = np.repeat(np.arange(seen.shape[0] * seen.shape[1]), seen.shape[2])[seen.reshape(-1)]
     values = values.reshape(len(values), -1)[:, seen.reshape(-1)]
     together = -(-len(own) // MOST_VALUES)
