@@ -2,6 +2,8 @@
 
 from galileo_jax.model.effects import Effect, Normal, Parameter
 
+SD = 0.05
+
 
 class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.comes_down)):
     """A factor on the speed where the path bends.
@@ -13,7 +15,7 @@ class FootTransition(Effect, where=lambda scene: scene.has_table and any(scene.c
     """
 
     name = "foot_transition"
-    unknowns = (Parameter("foot_transition", "1", Normal(1.0, 0.05), 1.0, "nuisance", 0.1),)
+    unknowns = (Parameter("foot_transition", "1", Normal(1.0, SD), 1.0, "nuisance", 0.1),)
 
     def foot(self, theta, scene):
         return theta["foot_transition"]
