@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from galileo_jax.runtime.compilation_cache import cache_folder
-from galileo_jax.runtime.jax_setup import compile_loops_whole
+from galileo_jax.runtime.jax_setup import cache_folder, compile_loops_whole
 from tests.missing import find_shared_data, is_missing
 
 # Before anything imports jax; the commands' own subprocesses inherit it.

@@ -12,7 +12,7 @@ import galileo_jax
 from galileo_jax import __main__
 from galileo_jax.commands import command
 from galileo_jax.files import package_data
-from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime import jax_setup
 from galileo_jax.runtime.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -80,22 +80,22 @@ def test_unknown_scene_names_the_known_ones():
 
 def test_cache_is_in_the_users_cache_folder_and_can_be_switched_off(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv(compilation_cache.SWITCH, raising=False)
-    default = compilation_cache.cache_folder()
+    monkeypatch.delenv(jax_setup.SWITCH, raising=False)
+    default = jax_setup.cache_folder()
     assert default is not None
     assert default.parts[-2:] == ("galileo_jax", "jax")
-    monkeypatch.setenv(compilation_cache.SWITCH, str(tmp_path / "elsewhere"))
-    assert compilation_cache.cache_folder() == tmp_path / "elsewhere"
-    monkeypatch.setenv(compilation_cache.SWITCH, "off")
-    assert compilation_cache.cache_folder() is None
+    monkeypatch.setenv(jax_setup.SWITCH, str(tmp_path / "elsewhere"))
+    assert jax_setup.cache_folder() == tmp_path / "elsewhere"
+    monkeypatch.setenv(jax_setup.SWITCH, "off")
+    assert jax_setup.cache_folder() is None
 
 
 @pytest.mark.parametrize(("setting", "is_filled"), [("on", True), ("off", False)])
 def test_compiled_programs_are_kept_unless_switched_off(setting, is_filled, tmp_path):
     environment = {key: value for key, value in os.environ.items() if "CACHE" not in key}
-    environment[compilation_cache.SWITCH] = "off" if setting == "off" else str(tmp_path)
+    environment[jax_setup.SWITCH] = "off" if setting == "off" else str(tmp_path)
     code = (
-        "import jax; from galileo_jax.runtime import compilation_cache as c; c.enable(); "
+        "import jax; from galileo_jax.runtime import jax_setup as c; c.enable_cache(); "
         "jax.config.update('jax_persistent_cache_min_compile_time_secs', 0.0); "
         "jax.jit(lambda x: x * 2 + 1)(1.0)"
     )
@@ -109,7 +109,7 @@ def test_without_a_writable_cache_programs_are_compiled_anew(tmp_path):
     environment = {key: value for key, value in os.environ.items() if "CACHE" not in key}
     environment |= {"HOME": os.devnull, "XDG_CACHE_HOME": str(tmp_path / "file")}
     code = (
-        "import jax; from galileo_jax.runtime import compilation_cache as c; c.enable(); "
+        "import jax; from galileo_jax.runtime import jax_setup as c; c.enable_cache(); "
         "print(jax.jit(lambda x: x * 2 + 1)(1.0))"
     )
     call = [sys.executable, "-c", code]

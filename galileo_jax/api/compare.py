@@ -14,7 +14,7 @@ from galileo_jax.api.run import load_run
 from galileo_jax.api.track import TrackLike
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
-from galileo_jax.comparison.document import comparison_document
+from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
 from galileo_jax.results.command_line import command_line

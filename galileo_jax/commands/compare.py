@@ -44,7 +44,7 @@ def main(argv: Sequence[str]) -> None:
 
 def _lines(compared: "gx.Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
-    from galileo_jax.comparison.document import pulled
+    from galileo_jax.comparison.compare import pulled
     from galileo_jax.report import diagnosis_text
     from galileo_jax.report.fit_text import pull_text
 

@@ -16,7 +16,8 @@ failure, because the residuals no longer show that misfit.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
@@ -26,7 +27,7 @@ from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
-from galileo_jax.inference.result import error_of
+from galileo_jax.inference.result import PULLED_Z, error_of
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening, is_measured
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
@@ -112,6 +113,25 @@ class Comparison:
     def is_adequate(self) -> bool:
         """Whether the data do not contradict the model, with imperfections of usual sizes."""
         return self.p_value >= ADEQUATE_P and not self.unusual
+
+
+def comparison_document(comparison: Comparison) -> dict[str, Any]:
+    """compare.json (docs/reference/result_files.md): all cells, nuisances outside their priors."""
+    return {
+        "adequate": comparison.is_adequate if comparison.no_verdict is None else None,
+        "no_verdict": comparison.no_verdict,
+        "p_value": comparison.p_value,
+        "noise_scale": list(comparison.noise_scale),
+        "noise_misstated": comparison.is_noise_misstated,
+        "where": [asdict(place) for place in comparison.where],
+        "pulls": [asdict(pull) for pull in pulled(comparison)],
+        "error": dict(comparison.error),
+    }
+
+
+def pulled(comparison: Comparison) -> list[Pull]:
+    """The nuisances outside their priors."""
+    return [pull for pull in comparison.pulls if abs(pull.z) > PULLED_Z]
 
 
 def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:

@@ -4,17 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.comparison.compare import Comparison, Place
-from galileo_jax.comparison.document import pulled
+from galileo_jax.comparison.compare import Comparison, Place, pulled
 from galileo_jax.comparison.local_tests import AXES, WHOLE
 from galileo_jax.comparison.phases import PHASES, Phase, phases_of
-from galileo_jax.comparison.worst_interval import worst_interval
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 
 NUM_DRAWS = 60
+FEWEST = 3  # values in an interval
 MARKED_Z = 3.0  # below it a cell is no place where the model fails
 
 
@@ -165,3 +164,30 @@ def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
     marked = [p for p in comparison.where if p.z > MARKED_Z or p in first]
     own = [p for p in marked if (p.clip, p.object) == (clip, name)]
     return own[0] if own else None
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Of residuals: when, and |sum| / sqrt(number), in units of the noise."""
+
+    start_s: float
+    end_s: float
+    z: float
+
+
+def worst_interval(values: np.ndarray, times_s: np.ndarray) -> Interval | None:
+    """The interval of largest |sum| / sqrt(number).
+
+    `values` `[frame]` are N(0, 1) where the model is right; NaN is left out.
+
+    Returns:
+      None with fewer than three values. White noise gives a z of about 3.0 for 120 values.
+    """
+    known = np.isfinite(values)
+    if known.sum() < FEWEST:
+        return None
+    sums, times = np.concatenate([[0.0], np.cumsum(values[known])]), times_s[known]
+    first, last = np.triu_indices(len(sums), FEWEST)
+    strength = np.abs(sums[last] - sums[first]) / np.sqrt(last - first)
+    best = int(np.argmax(strength))
+    return Interval(float(times[first[best]]), float(times[last[best] - 1]), float(strength[best]))

@@ -74,7 +74,7 @@ def law_candidates(
             Candidate(
                 effects=law.hypothesis.effects,
                 hypothesis=law.hypothesis,
-                error=error_left(law.hypothesis.of(table.trials), law.hypothesis.fit),
+                error=error_left(law.trials, law.hypothesis.fit),
                 score_z=float(np.sqrt(2 * max(law.score, 0.0))),
                 log_evidence=law.hypothesis.evidence_over(table.base),
                 log_prior=log_prior([odds], len(table.library)),

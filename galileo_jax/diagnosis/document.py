@@ -4,24 +4,23 @@ The keys are listed in docs/reference/result_files.md.
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from galileo_jax.comparison.document import comparison_document
+from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
-from galileo_jax.diagnosis.each_clip import EachClip, kind_of
+from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
 from galileo_jax.inference.fit_posterior import fit_posterior
-from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import (
     IDENTIFIED_SD_Z,
     per_mass_entries,
@@ -33,18 +32,21 @@ from galileo_jax.search.hypothesis import Hypothesis
 Entries = dict[str, dict[str, Any]]  # by parameter
 
 NO_FORMULA = "no formula explains it"
+CALLED = {"extra_m_s2": "extra_acceleration_m_s2"}  # otherwise in the file
 
 
 def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     """The contract's dictionary."""
     named = trials.problems[0].observation.names
-    rounds = [(one, _with_forces(trials, one.hypothesis, seed)) for one in diagnosis.rounds]
+    rounds = [(one, _entries(trials, one.hypothesis, seed)) for one in diagnosis.rounds]
     added = {one.hypothesis.effects: entries for one, entries in rounds}
     document = comparison_document(diagnosis.base) | {
         "probability_none": diagnosis.probability_none,
         "candidates": [
             # What was added has the strength that its round has.
-            _candidate(c, added.get(c.effects) or _roughly(trials, c.hypothesis, seed))
+            _candidate(
+                c, added.get(c.effects) or _entries(trials, c.hypothesis, seed, is_rough=True)
+            )
             for c in diagnosis.candidates
         ],
         "verdict": {
@@ -77,21 +79,16 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             for clip, before, after in diagnosis.left_one_out
         ]
     if diagnosis.each_clip:
-        rows = [_clip_by_itself(one) for one in diagnosis.each_clip]
+        rows = [
+            {CALLED.get(key, key): _plain(value) for key, value in asdict(one).items()}
+            for one in diagnosis.each_clip
+        ]
         document["each_clip"] = {"kind": kind_of(diagnosis.each_clip), "clips": rows}
     return document
 
 
-def _clip_by_itself(one: EachClip) -> dict[str, Any]:
-    return {
-        "clip": one.clip,
-        "chi2_together": one.chi2_together,
-        "chi2_alone": one.chi2_alone,
-        "p_alone": one.p_alone,
-        "way_m": one.way_m.tolist(),
-        "extra_acceleration_m_s2": one.extra_m_s2.tolist(),
-        "sd_m_s2": one.sd_m_s2.tolist(),
-    }
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -109,7 +106,7 @@ def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dic
 
 def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
     """One round: effects, errors, p and what is said of the friction coefficients with them."""
-    return _history_row(one, _with_forces(trials, one.hypothesis, seed)[0])
+    return _history_row(one, _entries(trials, one.hypothesis, seed)[0])
 
 
 def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
@@ -125,24 +122,15 @@ def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
     }
 
 
-def _with_forces(
-    trials: JointProblem, hypothesis: Hypothesis, seed: int
-) -> tuple[Entries, Entries]:
-    """`_entries` of the posterior that `fit` gives."""
-    whose, fit = hypothesis.of(trials), hypothesis.fit
-    return _entries(whose, fit, fit_posterior(whose, fit, seed))
-
-
-def _roughly(trials: JointProblem, hypothesis: Hypothesis, seed: int) -> tuple[Entries, Entries]:
-    """`_entries` of the normal approximation: for many candidates the posterior takes seconds."""
-    whose, fit = hypothesis.of(trials), hypothesis.fit
-    return _entries(whose, fit, laplace_posterior(whose, fit, seed))
-
-
 def _entries(
-    trials: JointProblem, fit: GradientFit, posterior: Posterior
+    trials: JointProblem, hypothesis: Hypothesis, seed: int, is_rough: bool = False
 ) -> tuple[Entries, Entries]:
-    """As in result.json: of what is free, nuisances left out; and the force constants per mass."""
+    """As in result.json: of what is free, nuisances left out; and the force constants per mass.
+
+    By the posterior, or roughly by its normal approximation: of many candidates it takes seconds.
+    """
+    trials, fit = hypothesis.of(trials), hypothesis.fit
+    posterior = (laplace_posterior if is_rough else fit_posterior)(trials, fit, seed)
     spread = np.sqrt(np.diagonal(fit.covariance))
     free = [name for i, name in enumerate(trials.names) if fit.free[i]]
     forces = {
@@ -188,19 +176,16 @@ def _missing_force(
 ) -> dict[str, Any]:
     best = best_formula(diagnosis.candidates)
     is_explained = best is not None and explains(best)
-    text = best.title if best is not None and is_explained else NO_FORMULA
+    whole = {
+        "formula": best.title if best is not None and is_explained else NO_FORMULA,
+        "share_explained": diagnosis.share_explained(best),
+    }
+    curves = ("acceleration_m_s2", "sd_m_s2", "path_m", "speed_m_s")
     return {
         "time_s": missing.time_s.tolist(),
         "best_formula": None if best is None else _formula(best, is_explained),
         "objects": {
-            name: {
-                "acceleration_m_s2": missing.acceleration_m_s2[i].tolist(),
-                "sd_m_s2": missing.sd_m_s2[i].tolist(),
-                "path_m": missing.path_m[i].tolist(),
-                "speed_m_s": missing.speed_m_s[i].tolist(),
-                "formula": text,
-                "share_explained": diagnosis.share_explained(best),
-            }
+            name: {key: getattr(missing, key)[i].tolist() for key in curves} | whole
             for i, name in enumerate(names)
         },
     }

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
-from galileo_jax.diagnosis.expected_evidence import expected_leads
 from galileo_jax.diagnosis.law_verdict import (
     contested_by_law,
     law_contested,
@@ -23,8 +22,9 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     within_luck,
 )
-from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.search.fit import refit
 from galileo_jax.search.hypothesis import Hypothesis
 
 
@@ -64,9 +64,10 @@ class Judge:
 
     def _p_value(self, candidate: Candidate) -> float | None:
         """As far as its fit was compared."""
-        fit, comparison = self.comparisons.get(candidate.effects, (None, None))
-        is_known = comparison is not None and fit is candidate.hypothesis.fit
-        return comparison.p_value if is_known else None
+        known = self.comparisons.get(candidate.effects)
+        if known is None or known[0] is not candidate.hypothesis.fit:
+            return None
+        return known[1].p_value
 
     def verdict(self, candidates: Sequence[Candidate]) -> Verdict:
         """On a table without laws; what is named was looked at again."""
@@ -108,3 +109,51 @@ class Judge:
         leads = expected_leads(self.trials, named, alike)
         expected = list(zip(alike, leads, strict=True))
         return looked_at_again(verdict, named, expected, self.decisive)
+
+
+def expected_leads(
+    trials: JointProblem, candidate: Candidate, rivals: Sequence[Candidate]
+) -> list[float]:
+    """For each rival, by how many nats it is behind on average if the candidate is true.
+
+    How far a rival is behind in the clip is partly luck: its noise. The clip is therefore made
+    once more from the hypothesis' fit with its errors turned round, predicted - (measured -
+    predicted), which are as likely as those measured. All are fitted again. What luck gave to one
+    side it now gives to the other (exactly, where predictions are linear in the parameters), and
+    the mean is free of it:
+
+        expected = (log odds in the clip + log odds in the clip turned round) / 2
+    """
+    if not rivals:
+        return []
+    turned = turned_round(candidate.hypothesis.of(trials), candidate.hypothesis.fit)
+    fitter = GradientFitter(turned)
+    own = refit(fitter, candidate.hypothesis.fit).log_evidence
+    fitters = {id(candidate.hypothesis.of(trials)): fitter}
+    found = []
+    for rival in rivals:
+        its = rival.hypothesis.of(trials)
+        if id(its) not in fitters:
+            fitters[id(its)] = GradientFitter(_with_observations_of(its, turned))
+        lead = own - refit(fitters[id(its)], rival.hypothesis.fit).log_evidence
+        lead += candidate.log_prior - rival.log_prior
+        found.append(0.5 * (lead + candidate.log_odds - rival.log_odds))
+    return found
+
+
+def _with_observations_of(trials: JointProblem, seen: JointProblem) -> JointProblem:
+    """The trials, with other measurements of the same clips."""
+    pairs = zip(trials.problems, seen.problems, strict=True)
+    return JointProblem(tuple(replace(a, observation=b.observation) for a, b in pairs))
+
+
+def turned_round(trials: JointProblem, fit: GradientFit) -> JointProblem:
+    """The trials as they would be with errors of the opposite sign, if the fit were the truth."""
+    theta = trials.theta(fit.z, fit.free)
+    problems = []
+    for clip, problem in enumerate(trials.problems):
+        seen = problem.observation
+        predicted = problem.simulate(trials.of_clip(theta, clip))
+        turned = replace(seen, position_m=2 * predicted - seen.position_m)
+        problems.append(replace(problem, observation=turned))
+    return JointProblem(tuple(problems))

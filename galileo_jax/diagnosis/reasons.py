@@ -170,7 +170,7 @@ def because(
     asked = [name for name in KNOWN if name in fields - numbers.keys()]
     derived = {name: KNOWN[name](hypothesis, rival) for name in asked}
     numbers = {key: candidate.name for key, candidate in there.items()} | derived | numbers
-    said = numbers | {key: candidate.title for key, candidate in there.items()} | (words or {})
+    said = {**numbers, **{key: one.title for key, one in there.items()}, **(words or {})}
     return Reason(rule.partition(":")[0], _Sentence().format(template, **said), numbers)
 
 

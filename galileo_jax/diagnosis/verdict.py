@@ -248,8 +248,11 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
             because_all = because("contested_together", top, together[0], words, **numbers)
             return _ambiguous(_with_rivals(top, together), why, because_all)
         if same := [c for c in _same_by_data(top, possible) if c in explaining]:
-            alike, least = _with_rivals(top, same), {"least_log_evidence": SUBSTANTIAL}
-            by_prior = (because("separated_by_prior", top, c, **least) for c in alike[1:])
+            alike = _with_rivals(top, same)
+            by_prior = (
+                because("separated_by_prior", top, rival, least_log_evidence=SUBSTANTIAL)
+                for rival in alike[1:]
+            )
             return _ambiguous(alike, why, *by_prior)
         behind = [c for c in candidates if c in possible or top.log_odds - c.log_odds >= decisive]
         lead = reasons.decisive(top, behind, decisive)

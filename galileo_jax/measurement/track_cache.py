@@ -17,7 +17,7 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.runtime.atomic_write import replacing
-from galileo_jax.runtime.compilation_cache import cache_folder
+from galileo_jax.runtime.jax_setup import cache_folder
 from galileo_jax.tracking.track import Track
 
 FOLDER = "tracks"

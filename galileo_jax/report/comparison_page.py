@@ -9,8 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.comparison.compare import Comparison
-from galileo_jax.comparison.document import pulled
+from galileo_jax.comparison.compare import Comparison, pulled
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem

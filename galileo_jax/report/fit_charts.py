@@ -4,8 +4,8 @@ from typing import Literal
 
 import numpy as np
 
+from galileo_jax.comparison.path_residuals import Interval, worst_interval
 from galileo_jax.comparison.phases import Phase
-from galileo_jax.comparison.worst_interval import Interval, worst_interval
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.chart import (

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.plotly_figure import figure, to_json
 from galileo_jax.runtime.atomic_write import replacing
-from galileo_jax.runtime.compilation_cache import cache_folder
+from galileo_jax.runtime.jax_setup import cache_folder
 
 NO_SCRIPT = (
     '<noscript><p class="warn">Charts and clip need JavaScript; text and tables do not.</p>'

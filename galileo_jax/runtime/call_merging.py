@@ -8,6 +8,9 @@ for a program, the calls of the same one, of the same shapes, become one call wi
     group = Together()
     with group.member(): ...     # in each thread; what it calls inside is made together
 
+A program has `key_of(args)`, what calls have in common that can be made together, and
+`of_many(calls)`, the results of several with the same key (`trace_cache.TraceCached`).
+
 On a CPU nothing is gained: a core computes one call after the other, whoever asks.
 """
 
@@ -15,29 +18,16 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import jax
 
 from galileo_jax.runtime.progress import Cancelled
 
 
-@runtime_checkable
-class Mergeable(Protocol):
-    """A compiled program."""
-
-    def key_of(self, args: tuple[Any, ...]) -> Any:
-        """What calls have in common that can be made together."""
-        ...
-
-    def of_many(self, calls: Sequence[tuple[Any, ...]]) -> Sequence[Any]:
-        """The results of several calls with the same key."""
-        ...
-
-
 @dataclass
 class _Call:
-    program: Mergeable
+    program: Any
     args: tuple[Any, ...]
     is_64_bit: bool
     is_done: bool = False
@@ -84,7 +74,7 @@ class Together:
                 self._num_members -= 1
                 self._make_if_all_wait()
 
-    def call(self, program: Mergeable, args: tuple[Any, ...]) -> Any:
+    def call(self, program: Any, args: tuple[Any, ...]) -> Any:
         """The program's result, once all members wait for theirs.
 
         Raises:

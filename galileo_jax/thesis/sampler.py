@@ -1,7 +1,6 @@
 """The thesis's sampler: short chains of uniform proposals, and the best sample wins."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar, NamedTuple
 
@@ -119,8 +118,7 @@ class Thesis(AbstractSampler):
         return moved, Info(rate, is_accepted)
 
 
-@dataclass(frozen=True)
-class ThesisResult:
+class ThesisResult(NamedTuple):
     """The thesis's answer.
 
     Attributes:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from galileo_jax.commands import command, compare
-from galileo_jax.comparison.document import comparison_document
+from galileo_jax.comparison.compare import comparison_document
 from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
 from tests.found import comparison_of, make_trials
 from tests.oracle_run import HIT, make_run

@@ -14,12 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 
 jax.config.update("jax_enable_x64", True)
-from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime import jax_setup
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.engine_path import EnginePath
 from tests.ramp_model import HIT, make_model
 
-compilation_cache.enable()
+jax_setup.enable_cache()
 engine = EnginePath(make_model(HIT, 1.2))
 z = np.random.default_rng(0).standard_normal((20, len(engine.model.parameters)))
 theta = np.asarray(PriorTable.of(engine.model.parameters).forward(jnp.asarray(z)))

@@ -50,11 +50,20 @@ class FittedLaw:
     hypothesis: Hypothesis
     score: float
 
+    @property
+    def trials(self) -> JointProblem:
+        """Whose parameters were fitted."""
+        assert self.hypothesis.trials is not None
+        return self.hypothesis.trials
+
+    @property
+    def theta(self) -> np.ndarray:
+        """All of them, noise scales last."""
+        return self.trials.theta(self.hypothesis.fit.z, self.hypothesis.fit.free)
+
     def constants(self) -> dict[str, float]:
         """Values at the fit, the strength first, as `c`."""
-        trials, fit = self.hypothesis.trials, self.hypothesis.fit
-        assert trials is not None
-        theta = dict(zip(trials.names, trials.theta(fit.z, fit.free), strict=True))
+        theta = dict(zip(self.trials.names, self.theta, strict=True))
         name = name_of(self.structure)
         values = {"c": float(theta[name])}
         return values | {key: float(theta[f"{name}_{key}"]) for key in self.structure.constants}
@@ -125,16 +134,8 @@ def without_twins(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
 
 def _motion(law: FittedLaw, first: FittedLaw) -> np.ndarray:
     """What a law's fit leaves of the tracks, `[value]`, in units of the noise of the first's."""
-    (theta, trials), (best, _) = _values(law), _values(first)
-    scale = best[-len(trials.problems) :]
-    return np.concatenate(whitened(trials, theta[None], scale), axis=1)[0]
-
-
-def _values(law: FittedLaw) -> tuple[np.ndarray, JointProblem]:
-    """All parameters, noise scales last, and whose they are."""
-    trials, fit = law.hypothesis.trials, law.hypothesis.fit
-    assert trials is not None
-    return trials.theta(fit.z, fit.free), trials
+    scale = first.theta[-len(law.trials.problems) :]
+    return np.concatenate(whitened(law.trials, law.theta[None], scale), axis=1)[0]
 
 
 def _simpler(law: FittedLaw) -> list[Suggestion]:
@@ -173,10 +174,7 @@ def _fitted(
         fits[i] = max(fits[i], refit(fitter, fits[i]), key=lambda fit: fit.log_evidence)
     made = [
         FittedLaw(
-            one.structure,
-            source,
-            Hypothesis((name_of(one.structure),), fit, extended),
-            one.score,
+            one.structure, source, Hypothesis((name_of(one.structure),), fit, extended), one.score
         )
         for i, (one, source, fit) in enumerate(zip(found, sources, fits, strict=True))
     ]

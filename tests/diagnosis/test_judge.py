@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis import expected_evidence
-from galileo_jax.diagnosis.expected_evidence import expected_leads, turned_round
+from galileo_jax.diagnosis import judge
+from galileo_jax.diagnosis.judge import expected_leads, turned_round
 from tests.found import candidate_of, fit_of, make_trials
 from tests.precision import in_64_bit
 
@@ -45,8 +45,8 @@ def test_luck_cancels_in_the_mean_of_both_clips(trials, monkeypatch):
         (name,) = [n for n in evidence if (fit.free == trials.free(n)).all()]
         return replace(fit, log_evidence=evidence[name])
 
-    monkeypatch.setattr(expected_evidence, "GradientFitter", lambda turned: turned)
-    monkeypatch.setattr(expected_evidence, "refit", refit)
+    monkeypatch.setattr(judge, "GradientFitter", lambda turned: turned)
+    monkeypatch.setattr(judge, "refit", refit)
     best = replace(candidate_of(trials, "air_drag", 0.5), log_evidence=42.0, log_prior=-2.0)
     rival = replace(candidate_of(trials, "viscous_drag", 0.5), log_evidence=40.0, log_prior=-5.0)
     assert expected_leads(trials, best, [rival]) == [pytest.approx(0.5 * (5.0 + 9.0))]
@@ -58,5 +58,5 @@ def test_a_hypothesis_is_not_ahead_of_itself(trials):
 
 
 def test_where_there_is_no_rival_nothing_is_fitted(trials, monkeypatch):
-    monkeypatch.setattr(expected_evidence, "GradientFitter", None)
+    monkeypatch.setattr(judge, "GradientFitter", None)
     assert expected_leads(trials, candidate_of(trials, "air_drag", 0.5), []) == []
