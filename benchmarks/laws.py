@@ -9,9 +9,8 @@ these of the library (and the forms) stand against the laws, which takes less ti
 stays in DIR/results.jsonl.
 """
 
-import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -72,22 +71,17 @@ def main(
     figures = {
         "num": len(hidden),
         "seen": len(seen),
-        "right": _share(row["right"] for row in seen),
-        "wrong_claims": _share(row["status"] == "law" and not row["right"] for row in hidden),
-        "named_wrongly": _share(row["status"] == "named" for row in seen),
-        "best_formula_right": _share(row["best_right"] for row in seen if row["formulas"]),
-        "law_where_none": _share(row["status"] == "law" for row in others),
+        "right": tables.mean(row["right"] for row in seen),
+        "wrong_claims": tables.mean(row["status"] == "law" and not row["right"] for row in hidden),
+        "named_wrongly": tables.mean(row["status"] == "named" for row in seen),
+        "best_formula_right": tables.mean(row["best_right"] for row in seen if row["formulas"]),
+        "law_where_none": tables.mean(row["status"] == "law" for row in others),
         "num_others": len(others),
         "cpu_s": float(np.median([row["cpu_s"] for row in rows])),
     }
     tables.summary(figures)
     after = [row["chi2_after"] for row in laws if row["right"]]
     return figures | {"clips": clips, "seed": seed, "candidates": chosen, "chi2_after": after}
-
-
-def _share(values: Iterable[bool]) -> float:
-    found = list(values)
-    return float(np.mean(found)) if found else math.nan
 
 
 def _clips(path: Path, name: str, seed: int, count: int) -> list[Clip]:

@@ -213,9 +213,9 @@ def summary(
         "ambiguous": len(ambiguous),
         "ambiguous_inside": num_inside,
         "ambiguous_inside_holds_truth": 1 - len(unheld) / num_inside if num_inside else math.nan,
-        "named_right_inside": _mean([s.is_named_right for s in inside]),
-        "wrong_inside": _mean([s.is_confident_wrong for s in inside]),
-        "wrong_outside": _mean([s.is_confident_wrong for s in outside]),
+        "named_right_inside": tables.mean(s.is_named_right for s in inside),
+        "wrong_inside": tables.mean(s.is_confident_wrong for s in inside),
+        "wrong_outside": tables.mean(s.is_confident_wrong for s in outside),
         "statuses": {
             kind: dict(
                 Counter(e["diagnosis"]["verdict"]["status"] for e in entries if e["kind"] == kind)
@@ -307,10 +307,6 @@ def _not_contradicted(diagnosis: Mapping[str, Any]) -> float:
     p_values = [(c["probability"], c.get("p_value")) for c in diagnosis["candidates"]]
     p_values.append((diagnosis.get("probability_none", 0.0), diagnosis.get("p_value")))
     return 1.0 - sum(p for p, by_data in p_values if by_data is not None and by_data < ADEQUATE_P)
-
-
-def _mean(values: Sequence[bool]) -> float:
-    return float(np.mean(values)) if values else math.nan
 
 
 def _print(figures: Mapping[str, Any]) -> None:

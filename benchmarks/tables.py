@@ -53,6 +53,12 @@ def _plain(value: Any) -> Any:
     return int(value) if isinstance(value, np.integer) else value
 
 
+def mean(values: Iterable[float]) -> float:
+    """The mean of what is known; NaN where nothing is."""
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan
+
+
 def summary(figures: Mapping[str, Any]) -> None:
     """Prints every figure that is a single number, a row each."""
     for name, value in figures.items():

@@ -83,8 +83,8 @@ def rows_of(clip: Clip, truth: Mapping[str, Any], track: Track, seconds: float) 
                 float(np.sqrt((shifted**2).sum(axis=1).mean())),
                 float(np.abs(error).max()),
                 float(squares.mean()),
-                _mean(squares[~moves]),
-                _mean(squares[moves]),
+                tables.mean(squares[~moves]),
+                tables.mean(squares[moves]),
                 float(pairs) if len(moving) > 4 else float("nan"),
                 float(seen.mean()),
                 int((~seen[covered:]).sum()),
@@ -92,10 +92,6 @@ def rows_of(clip: Clip, truth: Mapping[str, Any], track: Track, seconds: float) 
             )
         )
     return rows
-
-
-def _mean(values: np.ndarray) -> float:
-    return float(values.mean()) if len(values) else float("nan")
 
 
 def main(folder: Path, *, find: bool = False) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numpy as np
+from benchmarks import tables
 
 Kind = Literal["none", "library", "exotic"]
 
@@ -106,14 +106,14 @@ def summary(scores: Sequence[Score]) -> dict[str, float]:
         "known": len(known),
         "named_right": _rate(known, lambda score: score.is_named_right),
         "covered": _rate(known, lambda score: score.is_covered),
-        "mean_set_size": _mean([score.set_size for score in known]),
+        "mean_set_size": tables.mean(score.set_size for score in known),
         "confident_wrong": _rate(known, lambda score: score.is_confident_wrong),
         "missed": _rate(known, lambda score: score.label == "none"),
         "exotic": len(exotic),
         "unknown_recognised": _rate(exotic, lambda score: score.is_recognised),
         "confident_wrong_exotic": _rate(exotic, lambda score: score.is_confident_wrong),
-        "noise_before": _mean([score.before for score in known]),
-        "noise_after": _mean([score.after for score in named]),
+        "noise_before": tables.mean(score.before for score in known),
+        "noise_after": tables.mean(score.after for score in named),
         "noise_after_worst": max((score.after for score in named), default=math.nan),
     }
 
@@ -137,9 +137,4 @@ def missed_bars(figures: Mapping[str, float], is_series: bool) -> list[str]:
 
 
 def _rate(scores: Sequence[Score], is_so: Callable[[Score], bool]) -> float:
-    return _mean([float(is_so(score)) for score in scores])
-
-
-def _mean(values: Sequence[float]) -> float:
-    numbers = [value for value in values if not math.isnan(value)]
-    return float(np.mean(numbers)) if numbers else math.nan
+    return tables.mean(float(is_so(score)) for score in scores)

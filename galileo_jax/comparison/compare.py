@@ -27,6 +27,7 @@ from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
+from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.result import PULLED_Z, error_of
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening, is_measured
@@ -152,18 +153,15 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     cells = _cells(trials, labels, scales)
     pulls = _pulls(trials, fit, theta)
 
-    num_values = np.array([problem.data.num_values for problem in trials.problems], dtype=float)
+    whitenings = [problem.data for problem in trials.problems]
+    num_values = np.array([data.num_values for data in whitenings], dtype=float)
     used = fit.num_used * num_values / num_values.sum()
 
     def judged(bounds: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The p-value and each cell's largest z, noise scales within bounds."""
+        clips = list(zip(scales, used, whitenings, strict=True))
         own, others = (
-            [
-                _at_own_scale(white, scale, own_used, bounds, problem.data)
-                for white, scale, own_used, problem in zip(
-                    whites, scales, used, trials.problems, strict=True
-                )
-            ]
+            [_at_own_scale(w, *clip, bounds) for w, clip in zip(whites, clips, strict=True)]
             for whites in (measured, drawn)
         )
         return _p_value(own, others, cells, pulls)
@@ -175,11 +173,15 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         p_free, z_free = judged(ANY_SCALE)
         p, z = (p_free, z_free) if p_free >= ADEQUATE_P else (p, z)
     white = [
-        errors_at(own, scale[None], np.ones(1), problem.data)[0]
-        for own, scale, problem in zip(measured, scales, trials.problems, strict=True)
+        errors_at(own, scale[None], np.ones(1), data)[0]
+        for own, scale, data in zip(measured, scales, whitenings, strict=True)
+    ]
+    predicted = [
+        problem.simulate(trials.of_clip(theta, c)) for c, problem in enumerate(trials.problems)
     ]
     places = [
-        _place(trials, theta, white, cell, float(own)) for cell, own in zip(cells, z, strict=True)
+        _place(trials.problems[cell.clip], predicted[cell.clip], white[cell.clip], cell, float(own))
+        for cell, own in zip(cells, z, strict=True)
     ]
     return Comparison(
         p_value=p,
@@ -211,11 +213,7 @@ def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarra
 
 
 def _at_own_scale(
-    white: np.ndarray,
-    scale: float,
-    used: float,
-    bounds: tuple[float, float],
-    data: Whitening,
+    white: np.ndarray, scale: float, used: float, data: Whitening, bounds: tuple[float, float]
 ) -> np.ndarray:
     """Tracking errors `[point, value]` in units of their fitted size, within bounds.
 
@@ -278,25 +276,19 @@ def _pulls(trials: JointProblem, fit: GradientFit, theta: np.ndarray) -> list[Pu
 
 
 def _place(
-    trials: JointProblem,
-    theta: np.ndarray,
-    white: list[np.ndarray],
-    cell: Cell,
-    z: float,
+    problem: Problem, predicted_m: np.ndarray, white: np.ndarray, cell: Cell, z: float
 ) -> Place:
-    problem = trials.problems[cell.clip]
     observation = problem.observation
     i, a = observation.names.index(cell.object), observation.axes.index(cell.axis)
     frames = len(observation.times_s)
     index = cell.index % frames
-    predicted = problem.simulate(trials.of_clip(theta, cell.clip))
-    residual = observation.measured_part(observation.position_m - predicted)[i, a, index]
+    residual = observation.measured_part(observation.position_m - predicted_m)[i, a, index]
     follows = np.diff(index) == 1
     dt = np.diff(observation.times_s[index])[follows]
     speed = np.diff(residual)[follows] / dt
     variance = observation.measured_variance_m2[i, a, index]
     noise = (variance[1:] + variance[:-1])[follows] / dt**2
-    left = white[cell.clip][cell.index]
+    left = white[cell.index]
     neighbours = float(np.sum(left[1:] * left[:-1]) / max(np.sum(left**2), 1e-12))
     return Place(
         clip=problem.name,

@@ -12,9 +12,9 @@ from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
 
-PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fall")
+ON_A_SURFACE = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
+PHASES = (*ON_A_SURFACE, "fall", "flight", "swing", "liquid")
 FREE = {"spring": "swing", "pendulum": "swing", "liquid": "liquid"}  # by the law that makes it
-PHASES += ("flight", "swing", "liquid")
 COLLISION_S = 0.05  # either side of the hit
 RESTS_M_S, TOUCHES_M = 2e-3, 1e-4
 

@@ -67,6 +67,7 @@ def expect(
     best = beliefs.of[0]
     scale = trials.noise_scale(trials.theta(best.z, best.free), 0)
     log_odds = np.array([one.log_odds for one in beliefs.of])
+    has_others = len(trials.problems[0].observation.names) > 1
     found = []
     for i, setting in enumerate(settings):
         progress.report("simulating possible experiments", i / len(settings))
@@ -75,9 +76,7 @@ def expect(
         gain = about_hypotheses(rehearsed, log_odds, beliefs.margin, seed)
         nats = gain.nats if about is None else _about(trials, beliefs, rehearsed, about)
         hits = float(beliefs.probability @ [one.hits for one in rehearsed])
-        has_others = len(trials.problems[0].observation.names) > 1
-        hit = hits if has_others else None
-        found.append(Expected(setting, nats, gain.named, gain.lead, hit))
+        found.append(Expected(setting, nats, gain.named, gain.lead, hits if has_others else None))
     return found
 
 

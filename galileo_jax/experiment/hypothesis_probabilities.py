@@ -16,7 +16,6 @@ from galileo_jax.diagnosis.stakes import decisive_margin
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.search.hypothesis import Hypothesis
 
 FILE = "hypotheses.npz"
 # Of the hypotheses so many take part, unless they are so improbable that no experiment that anybody
@@ -72,17 +71,14 @@ def beliefs_of(found: Diagnosis) -> Beliefs:
     Laws are left out: their parameters are not those of the library, so that no rollout of another
     setting would know them.
     """
-    every = [_belief(found.rounds[0].hypothesis, 0.0)]
-    library = [one for one in found.candidates if one.law is None]
-    every += [_belief(one.hypothesis, one.log_odds) for one in library]
+    library = [(one.hypothesis, one.log_odds) for one in found.candidates if one.law is None]
+    every = [
+        Belief(one.effects, log_odds, one.fit.z, one.fit.free, one.fit.covariance)
+        for one, log_odds in [(found.rounds[0].hypothesis, 0.0), *library]
+    ]
     every.sort(key=lambda one: -one.log_odds)
     near = [one for one in every if every[0].log_odds - one.log_odds < FARTHEST][:MOST]
     return Beliefs(tuple(near), decisive_margin(found.base.is_adequate))
-
-
-def _belief(hypothesis: Hypothesis, log_odds: float) -> Belief:
-    fit = hypothesis.fit
-    return Belief(hypothesis.effects, log_odds, fit.z, fit.free, fit.covariance)
 
 
 def write_beliefs(path: Path, trials: JointProblem, beliefs: Beliefs) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.experiment.settings import Can, Choices, Range, check_can, grid, known_as
+from galileo_jax.experiment.settings import Can, check_can, grid, known_as
 
 VARIED = ("height", "release", "angle", "fps", "place2")
 # A verdict is believed when it has stood so many rounds, each with another clip; what is faint or
@@ -79,10 +79,4 @@ def _says(one: Mapping[str, Any]) -> tuple[str, Any]:
 
 def _unit(can: Can, settings: Sequence[Mapping[str, Any]]) -> np.ndarray:
     """Settings as points of the unit cube, `[setting, axis]`."""
-    return np.array([[_share(kind, one[name]) for name, kind in can.items()] for one in settings])
-
-
-def _share(kind: Range | Choices, value: Any) -> float:
-    if isinstance(kind, Range):
-        return (value - kind.low) / (kind.high - kind.low)
-    return kind.values.index(value) / max(len(kind.values) - 1, 1)
+    return np.array([[kind.share(one[name]) for name, kind in can.items()] for one in settings])

@@ -50,6 +50,14 @@ class Range:
         inner = np.linspace(self.low, self.high, number)[1:-1]
         return (self.low, *(float(f"{value:.4g}") for value in inner), self.high)
 
+    def at(self, share: float) -> float:
+        """The value at a share of the way from low to high."""
+        return float(f"{self.low + share * (self.high - self.low):.4g}")
+
+    def share(self, value: float) -> float:
+        """Of the way from low to high at which a value is."""
+        return (value - self.low) / (self.high - self.low)
+
     @property
     def middle(self) -> float:
         """Of the range."""
@@ -65,6 +73,14 @@ class Choices:
     def levels(self, number: int) -> tuple[Any, ...]:
         """All."""
         return self.values
+
+    def at(self, share: float) -> Any:
+        """The value at a share of the way through them."""
+        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+
+    def share(self, value: Any) -> float:
+        """Of the way through them at which a value is."""
+        return self.values.index(value) / max(len(self.values) - 1, 1)
 
     @property
     def middle(self) -> Any:
@@ -133,7 +149,7 @@ def grid(can: Can, seed: int = 0, most: int = MOST_SETTINGS) -> list[dict[str, A
     sobol = qmc.Sobol(len(can), rng=np.random.default_rng([seed, 61]))
     points = sobol.random(2 ** int(math.log2(most)))
     return [
-        {name: _at(kind, u) for (name, kind), u in zip(can.items(), row, strict=True)}
+        {name: kind.at(u) for (name, kind), u in zip(can.items(), row, strict=True)}
         for row in points
     ]
 
@@ -160,12 +176,6 @@ def text_of(setting: Mapping[str, Any]) -> str:
             phrase = PHRASES.get(known) if isinstance(value, Real) else None
             parts.append(phrase.format(value) if phrase else f"{name} {value}")
     return ", ".join(parts)
-
-
-def _at(kind: Range | Choices, u: float) -> Any:
-    if isinstance(kind, Choices):
-        return kind.values[min(int(u * len(kind.values)), len(kind.values) - 1)]
-    return float(f"{kind.low + u * (kind.high - kind.low):.4g}")
 
 
 def _parsed(text: str) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """The thesis's estimator on a problem: velocity profiles, its similarities, its sampler."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -59,12 +61,5 @@ def thesis_posterior(
     draws = answer.posterior.draws
     whole = np.tile(rest_theta, (*draws.shape[:2], 1))
     whole[..., where] = draws
-    posterior = Posterior(
-        names=trials.names,
-        draws=whole,
-        log_density=answer.posterior.log_density,
-        status=answer.posterior.status,
-        stats=answer.posterior.stats,
-        provenance=answer.posterior.provenance,
-    )
+    posterior = replace(answer.posterior, names=trials.names, draws=whole)
     return posterior, dict(zip(SEARCHED, map(float, answer.estimate), strict=True))

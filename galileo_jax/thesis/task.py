@@ -1,7 +1,6 @@
 """The thesis's setting: one fixed scene at 20 degrees, no noise, masses and frictions uniform."""
 
 import functools
-from typing import Any
 
 import jax
 import numpy as np
@@ -49,12 +48,8 @@ class ThesisTask:
 
     def positions(self, theta: np.ndarray) -> np.ndarray:
         """Centres in every frame, `[count, object, 2, frames + 1]`, m."""
-        return self.at_frames(self.engine.simulate(theta)[0])
-
-    def at_frames(self, position: Any) -> Any:
-        """Of a rollout's records `[..., record]` those that fall on frames `[..., frames + 1]`."""
         stride = round(1 / (FPS * self.engine.model.record_dt_s))
-        return position[..., ::stride][..., : self.config.frames + 1]
+        return self.engine.simulate(theta)[0][..., ::stride][..., : self.config.frames + 1]
 
     def make(self, key: jax.Array, count: int) -> Arrays:
         """`profile` `[sample, 4, frame]`, cm a frame, and `target` `[sample, 4]`."""

@@ -98,8 +98,8 @@ def test_one_factor_may_do_nothing():
     decay, power = both.constants
     values = {"c": -3.5, decay: 0.3, power: 0.03}
     push, drag = without_one_factor(both, values)
-    assert push == (Structure("push", False, (FACTOR["decay_t"],)), {decay: 0.3}, 3.5)
-    assert drag == (Structure("drag", False, (FACTOR["power_v"],)), {power: 0.03}, -3.5)
+    assert push == (Structure("push", False, (FACTOR["decay_t"],)), {decay: 0.3, "c": 3.5})
+    assert drag == (Structure("drag", False, (FACTOR["power_v"],)), {power: 0.03, "c": -3.5})
     assert without_one_factor(DRAG, {"c": 1.0, "n": 2.0}) == []
 
 
@@ -108,9 +108,9 @@ def test_constants_of_the_same_name_keep_their_factor():
     values = {"c": 0.4, "moment": 1.0, "width": 2.0, "place": 3.0, "width2": 4.0}
     assert set(both.constants) == set(values) - {"c"}
     found = without_one_factor(both, values)
-    assert [constants for _, constants, _ in found] == [
-        {"moment": 1.0, "width": 2.0},
-        {"place": 3.0, "width": 4.0},
+    assert [constants for _, constants in found] == [
+        {"moment": 1.0, "width": 2.0, "c": 0.4},
+        {"place": 3.0, "width": 4.0, "c": 0.4},
     ]
 
 

@@ -41,15 +41,16 @@ def sight(missing_m_s2: np.ndarray, k: float = 0.2, per_m: float = 3000.0) -> Si
 
 def made(label: str, score: float, nature: Any = "push", is_on_all: bool = False) -> Suggestion:
     factors = tuple(FACTOR[each] for each in label.split("*"))
-    return Suggestion(Structure(nature, is_on_all, factors), (), (), score)
+    return Suggestion(Structure(nature, is_on_all, factors), (), score)
 
 
 def test_constants_between_the_points_of_the_grid_are_found():
     gust = 3.0 * np.exp(-(((TIMES - 0.407) / 0.057) ** 2))
     found = suggestion_of([sight(gust)], Structure("push", False, (FACTOR["pulse_t"],)), RANGES)
     assert found is not None
-    assert found.starts[0] == pytest.approx({"moment": 0.407, "width": 0.057}, abs=1e-3)
-    assert found.strengths[0] == pytest.approx(3.0, rel=0.01)
+    start = dict(found.starts[0])
+    assert start.pop("c") == pytest.approx(3.0, rel=0.01)
+    assert start == pytest.approx({"moment": 0.407, "width": 0.057}, abs=1e-3)
 
 
 def test_starts_are_apart():
@@ -77,7 +78,7 @@ def test_no_friction_becomes_negative(k, change):
     structure = Structure("friction", False, (FACTOR["pulse_t"],))
     found = suggestion_of([sight(push, k)], structure, RANGES)
     assert found is not None
-    assert found.strengths[0] == pytest.approx(change, abs=0.02)
+    assert found.starts[0]["c"] == pytest.approx(change, abs=0.02)
 
 
 @pytest.mark.parametrize(("forward_m_s2", "is_drag"), [(-2.0, True), (2.0, False)])

@@ -141,7 +141,7 @@ def _motion(law: FittedLaw, first: FittedLaw) -> np.ndarray:
 def _simpler(law: FittedLaw) -> list[Suggestion]:
     """A formula of two factors without one of them, from where it was fitted."""
     found = without_one_factor(law.structure, law.constants())
-    return [Suggestion(one, (own,), (strength,), law.score) for one, own, strength in found]
+    return [Suggestion(one, (own,), law.score) for one, own in found]
 
 
 def _fitted(
@@ -205,16 +205,14 @@ def _starts(
 ) -> list[np.ndarray]:
     """Starts in z: constants of the screening; all else as given, or as goes with it."""
     name, found = name_of(one.structure), []
-    for constants, strength in zip(one.starts, one.strengths, strict=True):
-        values = {f"{name}_{key}": value for key, value in constants.items()}
-        for others in (z, _with_formula(extended, z, one, constants, strength, views)):
-            start = others.copy()
-            size = strength
+    for constants in one.starts:
+        for others in (z, _with_formula(extended, z, one.structure, constants, views)):
+            start, values = others.copy(), dict(constants)
             if one.structure.nature == "friction":
                 theta = dict(zip(extended.names, extended.theta(start), strict=True))
-                size = strength / max(float(theta["k1"]), LEAST_FRICTION)
-            for key, value in {name: size, **values}.items():
-                at = extended.names.index(key)
+                values["c"] /= max(float(theta["k1"]), LEAST_FRICTION)
+            for key, value in values.items():
+                at = extended.names.index(name if key == "c" else f"{name}_{key}")
                 prior = extended.parameters[at].prior
                 inverse = float(prior.inverse(jnp.asarray(value)))
                 start[at] = np.clip(np.nan_to_num(inverse), -MOST_Z, MOST_Z)
@@ -225,20 +223,19 @@ def _starts(
 def _with_formula(
     extended: JointProblem,
     z: np.ndarray,
-    one: Suggestion,
+    structure: Structure,
     constants: Mapping[str, float],
-    strength: float,
     views: Sequence[View],
 ) -> np.ndarray:
     """All else where a linear model has it if the formula is there."""
     total, count = np.zeros(len(z)), np.zeros(len(z))
     for clip, view in enumerate(views):
         others = view.others()
-        grid = {key: np.array([value]) for key, value in constants.items()}
-        curves = accelerations(view, one.structure, grid, masses_and_frictions(view)[0])
+        grid = {key: np.array([constants[key]]) for key in structure.constants}
+        curves = accelerations(view, structure, grid, masses_and_frictions(view)[0])
         left = view.target()
         for i, (curve,) in enumerate(curves):
-            left = left - view.shows(i)[:, view.moves[i]] @ (strength * curve[view.moves[i]])
+            left = left - view.shows(i)[:, view.moves[i]] @ (constants["c"] * curve[view.moves[i]])
         design = view.fit.jacobian[:, others]
         normal = design.T @ design + np.eye(len(others))
         solved = -np.linalg.solve(normal, design.T @ left)

@@ -282,13 +282,13 @@ def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
 
 def without_one_factor(
     structure: Structure, values: Mapping[str, float]
-) -> list[tuple[Structure, dict[str, float], float]]:
+) -> list[tuple[Structure, dict[str, float]]]:
     """What a formula of two factors is without either of them: one may do nothing.
 
     `values` are those of its constants, and its strength as `c`.
 
     Returns:
-      The simpler formulas, each with its constants and strength.
+      The simpler formulas, each with its own.
     """
     found = []
     if len(structure.factors) == 1:
@@ -299,7 +299,6 @@ def without_one_factor(
             continue
         constants = {name: values[own] for name, own in names.items()}
         # A drag is against the motion, which is forward.
-        strength = values["c"] * (1.0 if nature == structure.nature else -1.0)
-        alone = Structure(nature, structure.is_on_all, (factor,))
-        found.append((alone, constants, strength))
+        constants["c"] = values["c"] * (1.0 if nature == structure.nature else -1.0)
+        found.append((Structure(nature, structure.is_on_all, (factor,)), constants))
     return found

@@ -44,14 +44,13 @@ class Suggestion:
 
     Attributes:
       structure: of the formula.
-      starts: constants by name, the best first, none near another.
-      strengths: c of each start, of the first object; of a friction c times its coefficient.
+      starts: constants by name, the best first, none near another; `c` is the strength on the
+        first object, of a friction times its coefficient.
       score: nats, see above.
     """
 
     structure: Structure
     starts: tuple[Mapping[str, float], ...]
-    strengths: tuple[float, ...]
     score: float
 
 
@@ -159,20 +158,21 @@ def suggestion_of(
     gain, strength = _gains(sights, structure, grid)
     if not gain.size:
         return None
+    columns = grid | {"c": strength}
     best = _apart(gain, grid)
-    starts = [{name: float(values[i]) for name, values in grid.items()} for i in best]
-    strengths, highest = [float(strength[i]) for i in best], float(gain[best[0]])
+    starts = [{name: float(values[i]) for name, values in columns.items()} for i in best]
+    highest = float(gain[best[0]])
     if grid:
         better = _refined(sights, structure, grid, starts[0])
         gain, strength = _gains(sights, structure, {k: np.array([v]) for k, v in better.items()})
         if gain.size and gain[0] > highest:
-            starts[0], strengths[0], highest = better, float(strength[0]), float(gain[0])
+            starts[0], highest = better | {"c": float(strength[0])}, float(gain[0])
     numbers = 1 + len(structure.constants)
     if structure.nature == "friction":  # the strength times each object's own coefficient
         numbers += (len(sights[0].responses) - 1) * structure.is_on_all
     price = 0.5 * numbers * log(sum(np.count_nonzero(sight.target) for sight in sights))
     price -= log(LENGTH_ODDS) * (len(structure.factors) - 1)
-    return Suggestion(structure, tuple(starts), tuple(strengths), highest - price)
+    return Suggestion(structure, tuple(starts), highest - price)
 
 
 def _apart(gain: np.ndarray, grid: Mapping[str, np.ndarray]) -> list[int]:
@@ -254,7 +254,7 @@ def _refined(
         gain, _ = _gains(sights, structure, point)
         return -float(gain[0]) if gain.size else 0.0
 
-    at = (np.array(list(start.values())) - low) / (high - low)
+    at = (np.array([start[name] for name in grid]) - low) / (high - low)
     steps = [0.5 / max(len(np.unique(values)) - 1, 1) for values in grid.values()]
     simplex = np.vstack([at, at + np.diag(np.where(at < 0.5, steps, np.negative(steps)))])
     options = {"initial_simplex": simplex, "maxfev": MOST_TRIES, "xatol": 1e-3, "fatol": 0.1}
