@@ -12,7 +12,7 @@ from scipy.special import softmax
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.each_clip import EachClip
-from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
+from galileo_jax.diagnosis.friction_along_way import Stretch
 from galileo_jax.model.effects.forms import FORM_FAMILIES, FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 
@@ -195,7 +195,7 @@ class Diagnosis:
     missing: MissingForce | None = None
     left_one_out: tuple[tuple[str, float, float], ...] = ()
     each_clip: tuple[EachClip, ...] = ()
-    friction: tuple[FrictionAlongWay, ...] = ()
+    friction: tuple[tuple[Stretch, ...], ...] = ()
 
     @property
     def base(self) -> Comparison:

@@ -13,7 +13,7 @@ from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
-from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
+from galileo_jax.diagnosis.friction_along_way import SHOWN, Stretch
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
 from galileo_jax.inference.fit_posterior import fit_posterior
@@ -191,14 +191,16 @@ def _missing_force(
     }
 
 
-def _friction(clips: Sequence[str], found: Sequence[FrictionAlongWay]) -> list[dict[str, Any]]:
+def _friction(clips: Sequence[str], found: Sequence[Sequence[Stretch]]) -> list[dict[str, Any]]:
     """Of each clip and body that slides, the coefficient against the way."""
     rows = []
-    for clip, one in zip(clips, found, strict=True):
-        for body, name in enumerate(one.names):
-            path_m, mean, sd = one.profile(body).tolist()
-            entry = {"clip": clip, "object": name, "path_m": path_m, "mean": mean, "sd": sd}
-            rows += [entry] if path_m else []
+    for clip, stretches in zip(clips, found, strict=True):
+        shown = [one for one in stretches if one.steps == SHOWN]
+        for name in dict.fromkeys(one.name for one in shown):
+            own = sorted((o for o in shown if o.name == name), key=lambda o: o.from_m + o.to_m)
+            path_m = [(one.from_m + one.to_m) / 2 for one in own]
+            entry = {"clip": clip, "object": name, "path_m": path_m}
+            rows.append(entry | {key: [getattr(one, key) for one in own] for key in ("mean", "sd")})
     return rows
 
 

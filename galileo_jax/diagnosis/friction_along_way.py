@@ -9,12 +9,10 @@ surface, over its mass. It is the smoothed process noise of what slides. How muc
 on a stretch is known well; how much of it is the coefficient k and how much deviates is not.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import averaged, linear_clips
@@ -33,15 +31,17 @@ STEP = 1e-4  # of z, for slopes
 
 
 class Stretch(NamedTuple):
-    """One of `FrictionAlongWay`.
+    """The friction of one body on a stretch of its way.
 
     Attributes:
       name: of the body.
-      from_m, to_m: past the foot.
+      steps: between how many frames: 1, 2, 4, ...
+      from_m, to_m: past the foot; on a slope alone, from where the track counts.
       mean, sd: of the mean coefficient.
     """
 
     name: str
+    steps: int
     from_m: float
     to_m: float
     mean: float
@@ -53,43 +53,10 @@ class Stretch(NamedTuple):
         return self.mean + CLEAR * self.sd < 0
 
 
-@dataclass(frozen=True)
-class FrictionAlongWay:
-    """Mean coefficients of friction on stretches of bodies' ways, in 1, 2, 4, ... steps of frames.
-
-    Attributes:
-      names: of the bodies.
-      body: `[stretch]`, whose.
-      steps: `[stretch]`, between how many frames.
-      from_m, to_m: `[stretch]`, past the foot; on a slope alone, from where the track counts.
-      mean, sd: `[stretch]`.
-    """
-
-    names: tuple[str, ...]
-    body: Int[np.ndarray, " stretch"]
-    steps: Int[np.ndarray, " stretch"]
-    from_m: Float[np.ndarray, " stretch"]
-    to_m: Float[np.ndarray, " stretch"]
-    mean: Float[np.ndarray, " stretch"]
-    sd: Float[np.ndarray, " stretch"]
-
-    @property
-    def stretches(self) -> Iterator[Stretch]:
-        """One by one."""
-        columns = (self.body, self.from_m, self.to_m, self.mean, self.sd)
-        for body, *numbers in zip(*(one.tolist() for one in columns), strict=True):
-            yield Stretch(self.names[body], *numbers)
-
-    def profile(self, body: int) -> Float[np.ndarray, "3 stretch"]:
-        """Middle of stretches of `SHOWN` steps of a body, m, mean and sd there, along the way."""
-        own = (self.body == body) & (self.steps == SHOWN)
-        middle = (self.from_m + self.to_m) / 2
-        found = np.stack([middle, self.mean, self.sd])[:, own]
-        return found[:, np.argsort(found[0])]
-
-
-def friction_along_way(trials: JointProblem, fit: GradientFit, clip: int = 0) -> FrictionAlongWay:
-    """The friction of one clip's bodies."""
+def friction_along_way(
+    trials: JointProblem, fit: GradientFit, clip: int = 0
+) -> tuple[Stretch, ...]:
+    """The friction of one clip's bodies on all stretches in which these move smoothly."""
     problem, linear = trials.problems[clip], linear_clips(trials, fit)[clip]
     motion, sizes = problem.seen_motion.motion, fit.sizes
     assert motion is not None and sizes is not None
@@ -112,15 +79,11 @@ def friction_along_way(trials: JointProblem, fit: GradientFit, clip: int = 0) ->
     at_middle = means @ coefficient - slopes @ fit.z[: slopes.shape[1]]  # where z is 0
     variance = np.einsum("st,tu,su->s", takes, speeds, takes, optimize=True)
     variance += np.sum(slopes**2, axis=1) - np.sum(gain * together, axis=1)
-    return FrictionAlongWay(
-        names=tuple(problem.observation.names),
-        body=body,
-        steps=last - first,
-        from_m=motion.path_m[body, first],
-        to_m=motion.path_m[body, last],
-        mean=at_middle + gain @ linear.e,
-        sd=np.sqrt(np.maximum(variance, 0.0)),
-    )
+    sd = np.sqrt(np.maximum(variance, 0.0))
+    ends = motion.path_m[body, first], motion.path_m[body, last]
+    columns = (last - first, *ends, at_middle + gain @ linear.e, sd)
+    names = (problem.observation.names[i] for i in body)
+    return tuple(map(Stretch, names, *(column.tolist() for column in columns)))
 
 
 def _stretches(motion: Kinematics) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.candidates import error_left
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
-from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
+from galileo_jax.diagnosis.friction_along_way import Stretch, friction_along_way
 from galileo_jax.diagnosis.judge import Judge
 from galileo_jax.diagnosis.law_verdict import joined_names, law_verdict
 from galileo_jax.diagnosis.stakes import num_expected, odds_of
@@ -46,12 +46,12 @@ class ImperfectWorld:
     comparison: Comparison
     table: tuple[Candidate, ...]
     judge: Judge
-    friction: tuple[FrictionAlongWay, ...] = ()
+    friction: tuple[tuple[Stretch, ...], ...] = ()
 
     @property
     def pushing(self) -> Stretch | None:
         """Where friction would have to push beyond doubt, the clearest; None: nowhere."""
-        every = [one for clip in self.friction for one in clip.stretches if one.pushes]
+        every = [one for clip in self.friction for one in clip if one.pushes]
         return min(every, key=lambda one: one.mean / one.sd, default=None)
 
     def round_called(self, effects: tuple[str, ...]) -> Round:
@@ -109,7 +109,7 @@ def imperfect_world(judge: Judge, base: Hypothesis) -> ImperfectWorld | None:
     if world.fit.sizes is None or world.fit.code is Code.FAILED:
         return None
     sized = Hypothesis(base.effects, world.fit, world.trials)
-    friction: tuple[FrictionAlongWay, ...] = ()
+    friction: tuple[tuple[Stretch, ...], ...] = ()
     if NAME in world.fit.sizes.unusual:
         every = range(len(trials.problems))
         friction = tuple(friction_along_way(world.trials, world.fit, clip) for clip in every)

@@ -10,7 +10,6 @@ from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.search.fit import best_fit
 from tests.oracle_trials import make_trials, observe
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 COUNT = 64
@@ -18,9 +17,8 @@ COUNT = 64
 
 @pytest.fixture(scope="module")
 def fitted():
-    with in_64_bit():
-        trials = make_trials([HIT])
-        return trials, best_fit(GradientFitter(trials), 0)
+    trials = make_trials([HIT])
+    return trials, best_fit(GradientFitter(trials), 0)
 
 
 def squares(trials, fit, num_steps=bootstrap.NUM_STEPS, costs=None):
@@ -36,7 +34,7 @@ def squares(trials, fit, num_steps=bootstrap.NUM_STEPS, costs=None):
             costs.append(np.mean(cost))
         return best, cost
 
-    with in_64_bit(), pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bootstrap, "NUM_STEPS", num_steps)
         patch.setattr(bootstrap, "_refitted", recorded)
         labels = [phases(trials.problems[0], trials.theta(fit.z, fit.free))]

@@ -14,18 +14,11 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.discrepancy import crossings, modes
 from tests.oracle_trials import make_trials
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 NUM_TRACKS, NUM_REPLICATES = 40, 200
 CHANCE = 0.01  # of a right comparison failing a test, had other seeds been taken
 MOST_BELOW = stats.binom.isf(CHANCE, NUM_TRACKS, 0.05)  # the seeds are fixed: this is no lottery
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def fit_near_truth(trials):
@@ -60,7 +53,7 @@ def draw_imperfections(trials, seed):
 def imperfect():
     """Trials, fits and p-values of `NUM_TRACKS` tracks as the likelihood says they are."""
     made = []
-    with in_64_bit(), pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "NUM_REPLICATES", NUM_REPLICATES)
         for seed in range(NUM_TRACKS):
             trials = make_trials([HIT], seed)

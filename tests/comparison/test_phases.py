@@ -3,20 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from galileo_jax.comparison.phases import COLLISION_S, PHASES, phases
 from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_theta
 from tests.reference_ramp import Experiment, solve
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def label(experiment: Experiment, effects=(), **given: float):

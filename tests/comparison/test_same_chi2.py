@@ -12,7 +12,6 @@ from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from tests.comparison.test_calibration import disturbed, fit_near_truth
 from tests.oracle_trials import make_trials
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 SAME = 0.01  # of it: one takes the degrees of freedom from draws, the other from the covariance
@@ -38,20 +37,19 @@ def cautious_tracker():
 @pytest.mark.parametrize("make", [wrong_model, cautious_tracker])
 def test_fit_and_compare_say_the_same(make, monkeypatch):
     monkeypatch.setattr(module, "NUM_REPLICATES", 8)
-    with in_64_bit():
-        trials = make()
-        fit = fit_near_truth(trials)
-        compared = compare(trials, fit, 0)
-        fitted = make_result(
-            trials,
-            laplace_posterior(trials, fit, 0),
-            fit.z,
-            clips=["a.csv"],
-            method="grad",
-            seed=0,
-            timings_s={},
-            notes={},
-        )["error"]
+    trials = make()
+    fit = fit_near_truth(trials)
+    compared = compare(trials, fit, 0)
+    fitted = make_result(
+        trials,
+        laplace_posterior(trials, fit, 0),
+        fit.z,
+        clips=["a.csv"],
+        method="grad",
+        seed=0,
+        timings_s={},
+        notes={},
+    )["error"]
     for name, value in compared.error.items():
         assert fitted[name] == pytest.approx(value, rel=SAME), name
     whole = [place for place in compared.where if place.phase == "whole"]

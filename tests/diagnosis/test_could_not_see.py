@@ -20,15 +20,8 @@ from galileo_jax.model.parameters import LogNormal, Normal, Uniform
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from tests.found import candidate_of, comparison_of
-from tests.precision import in_64_bit
 
 EFFECTS = ("air_drag", "rolling", "ramp_angle")
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def test_where_all_is_linear_the_strength_is_what_the_formula_gives():

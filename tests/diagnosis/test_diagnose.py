@@ -19,19 +19,12 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.series import draw_series
-from tests.precision import in_64_bit
 
 # Of all the library only these: what is near air drag, and what changes the start or the hit.
 CANDIDATES = ("air_drag", "release_delay", "restitution", "viscous_drag")
 AIR_DRAG_KG_M = 0.6
 GIVEN = {"m1": 0.5, "k1": 0.1, "m2": 0.3, "k2": 0.2}
 ANGLE_DEG, FPS, NOISE_M = 20.0, 30.0, 3e-4
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def simulated(

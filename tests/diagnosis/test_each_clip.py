@@ -11,15 +11,8 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.report.diagnosis_text import each_clip as told
 from galileo_jax.search.fit import best_fit
-from tests.precision import in_64_bit
 
 G, ANGLE, FPS, NOISE_M = 9.81, np.radians(22.0), 60, 3e-4
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def one(p: float, extra: tuple[float, ...]) -> EachClip:

@@ -58,21 +58,20 @@ def test_stretches_hold_the_friction_that_is_there(tmp_path, more):
     """Means within their sds, on short stretches and long ones; what pushes is no friction."""
     profile, (times, way) = found(tmp_path, more), slid(more)
     for steps in (2, SHOWN, 8):
-        own = profile.steps == steps
+        own = [one for one in profile if one.steps == steps]
         truth = []
-        for ends in zip(profile.from_m[own], profile.to_m[own], strict=True):
+        for ends in ((one.from_m, one.to_m) for one in own):
             # Over the time that it takes, in which speeds change evenly.
             begin, end = np.interp(ends, way, times)
             at = np.linspace(begin, end, 200)
             truth.append(friction(np.interp(at, times, way), more).mean())
-        z = (profile.mean[own] - truth) / profile.sd[own]
+        z = (np.array([one.mean for one in own]) - truth) / [one.sd for one in own]
         assert np.mean(z**2) < 2.0, (steps, z)
         assert np.mean(np.abs(z) < 2) > 0.85
-    shown = profile.profile(0)
-    where = np.argmax(np.abs(shown[1] - K))
-    assert abs(shown[0, where] - CENTRE_M) < WIDTH_M
-    assert shown[1, where] - K == pytest.approx(more, abs=0.2)
-    assert any(one.pushes for one in profile.stretches) == (more < 0)
-    for one in profile.stretches:
+    there = max((one for one in profile if one.steps == SHOWN), key=lambda one: abs(one.mean - K))
+    assert abs((there.from_m + there.to_m) / 2 - CENTRE_M) < WIDTH_M
+    assert there.mean - K == pytest.approx(more, abs=0.2)
+    assert any(one.pushes for one in profile) == (more < 0)
+    for one in profile:
         if one.pushes:
             assert one.from_m < CENTRE_M + WIDTH_M and one.to_m > CENTRE_M - WIDTH_M

@@ -15,7 +15,6 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.report.diagnosis_text import roughness
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
-from tests.precision import in_64_bit
 
 ANGLE_DEG, FRICTION, LENGTH_M = 25.0, 0.25, 0.01
 FPS, SUBSTEPS, NOISE_M, WAY_M = 100.0, 50, 1e-4, 0.9
@@ -138,7 +137,6 @@ def test_slow_errors_alone_are_no_effect(tmp_path, seed):
     assert gx.diagnose(thrown(tmp_path, 0.0, 0.002, seed), seed=0).verdict.status == "none"
 
 
-@in_64_bit()
 def test_an_effect_is_expected_at_its_strength_beside_imperfections(tmp_path):
     """Slow errors look like more drag in an exact world than beside errors."""
     t = np.arange(40) / 15

@@ -8,19 +8,11 @@ import pytest
 from galileo_jax.diagnosis import judge
 from galileo_jax.diagnosis.judge import expected_leads, turned_round
 from tests.found import candidate_of, fit_of, make_trials
-from tests.precision import in_64_bit
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory):
-    with in_64_bit():
-        return make_trials(tmp_path_factory.mktemp("clip"))
+    return make_trials(tmp_path_factory.mktemp("clip"))
 
 
 def test_errors_are_turned_round(trials):

@@ -15,7 +15,6 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.model.parameters import inverse
 from galileo_jax.search.hypothesis import Hypothesis
-from tests.precision import in_64_bit
 
 (DECAY,) = (factor for factor in FACTORS if factor.label == "decay_t")
 OVER_BEFORE_THE_HIT_S, LASTS_S = 0.05, 1.0
@@ -52,9 +51,8 @@ def law(trials, truth, structure: Structure, tau: float, evidence: float) -> Fit
 def test_twins_count_once(clip_of_two, tau, num, all_ahead):
     trials, truth = clip_of_two
     structures = [Structure("friction", is_on_all, (DECAY,)) for is_on_all in (True, False)]
-    with in_64_bit():
-        laws = [law(trials, truth, one, tau, 0.0) for one in structures]
-        found = without_twins(laws if all_ahead else laws[::-1])
+    laws = [law(trials, truth, one, tau, 0.0) for one in structures]
+    found = without_twins(laws if all_ahead else laws[::-1])
     assert len(found) == num
     assert not all(one.structure.is_on_all for one in found)  # the shorter claim is left
 
@@ -63,11 +61,10 @@ def test_twins_count_once(clip_of_two, tau, num, all_ahead):
 def test_the_more_evident_twin_is_left(clip_of_two, ahead, is_on_all):
     trials, truth = clip_of_two
     both, one = (Structure("friction", is_all, (DECAY,)) for is_all in (True, False))
-    with in_64_bit():
-        laws = [
-            law(trials, truth, both, OVER_BEFORE_THE_HIT_S, ahead),
-            law(trials, truth, one, OVER_BEFORE_THE_HIT_S, 0.0),
-        ]
-        laws = sorted(laws, key=lambda each: -each.hypothesis.fit.log_evidence)
-        (found,) = without_twins(laws)
+    laws = [
+        law(trials, truth, both, OVER_BEFORE_THE_HIT_S, ahead),
+        law(trials, truth, one, OVER_BEFORE_THE_HIT_S, 0.0),
+    ]
+    laws = sorted(laws, key=lambda each: -each.hypothesis.fit.log_evidence)
+    (found,) = without_twins(laws)
     assert found.structure.is_on_all == is_on_all

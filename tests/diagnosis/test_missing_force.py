@@ -24,17 +24,10 @@ from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from tests.oracle_trials import make_trials
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 NOISE_M = 3.3e-4  # 0.3 px at 900 px/m
 LEAST_COVERED = 0.85  # of the times, by a band for 95 %: neighbours err together
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 @pytest.fixture(scope="module")

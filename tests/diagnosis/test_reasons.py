@@ -14,13 +14,11 @@ from galileo_jax.diagnosis.reasons import (
 )
 from tests.diagnosis.test_verdict import candidate
 from tests.found import comparison_of, make_trials
-from tests.precision import in_64_bit
 
 
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory):
-    with in_64_bit():
-        return comparison_of(make_trials(tmp_path_factory.mktemp("clip")), 0.5)
+    return comparison_of(make_trials(tmp_path_factory.mktemp("clip")), 0.5)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.table import Table
 from tests.diagnosis.test_verdict import candidate
-from tests.precision import in_64_bit
 
 FORM = next(form for form in FORMS if form.name == "drag_of_a_power")
 NAMED = Verdict("named", ("viscous_drag",))
@@ -37,14 +36,13 @@ def judged(tmp_path, noise_m):
     clip = load_clip(path.with_suffix(".yaml"))
     both = (*make_effects(["viscous_drag"]), FORM)
     trials = make_joint_problem([clip], [read_observation_csv(path)], effects=both)
-    with in_64_bit():
-        fitter = GradientFitter(trials)
-        base = Hypothesis((), best_fit(fitter, 0, effects=()))
-        stakes = VerdictStakes(trials, False)
-        table = candidates_of(search(Table.of(fitter, stakes, 0, base), 1))
-        evidence = {c.name: c.log_evidence for c in table}
-        ahead = evidence["viscous_drag"] - evidence[FORM.name]
-        return with_known_constants(trials, NAMED, table, 0), ahead
+    fitter = GradientFitter(trials)
+    base = Hypothesis((), best_fit(fitter, 0, effects=()))
+    stakes = VerdictStakes(trials, False)
+    table = candidates_of(search(Table.of(fitter, stakes, 0, base), 1))
+    evidence = {c.name: c.log_evidence for c in table}
+    ahead = evidence["viscous_drag"] - evidence[FORM.name]
+    return with_known_constants(trials, NAMED, table, 0), ahead
 
 
 def test_where_a_clip_hardly_tells_the_power_its_interval_is_said(tmp_path):

@@ -13,16 +13,9 @@ from galileo_jax.experiment.predicted_experiment import Rehearsed, rehearse
 from galileo_jax.experiment.proposal import propose
 from galileo_jax.inference.joint_problem import JointProblem
 from tests.found import fit_of, make_trials
-from tests.precision import in_64_bit
 
 MARGIN = 3.0
 MONTE_CARLO = 0.05  # nats: three standard errors of 256 tracks from each hypothesis
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def normal(mean, slopes=None, rest=0.0) -> Rehearsed:
@@ -82,11 +75,10 @@ def test_the_gain_about_a_parameter_is_that_of_a_normal_distribution():
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory):
     """A clip seen so badly (2 cm) that brute force can integrate over everything."""
-    with in_64_bit():
-        (problem,) = make_trials(tmp_path_factory.mktemp("clip")).problems
-        seen = problem.observation
-        blurred = replace(seen, covariance_m2=1e4 * seen.covariance_m2)
-        return JointProblem((replace(problem, observation=blurred),))
+    (problem,) = make_trials(tmp_path_factory.mktemp("clip")).problems
+    seen = problem.observation
+    blurred = replace(seen, covariance_m2=1e4 * seen.covariance_m2)
+    return JointProblem((replace(problem, observation=blurred),))
 
 
 def beliefs(trials: JointProblem) -> list[Belief]:

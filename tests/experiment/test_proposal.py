@@ -16,36 +16,26 @@ from galileo_jax.measurement.measure import Measurement
 from galileo_jax.runtime.errors import InputError
 from tests.found import diagnosis_of, make_trials
 from tests.oracle_run import HIT, make_run
-from tests.precision import in_64_bit
 
 RELEASE_M = 0.5  # of HIT
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
-
-
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
-    with in_64_bit():
-        return make_run(tmp_path_factory.mktemp("run"), HIT, 1.6).clip
+    return make_run(tmp_path_factory.mktemp("run"), HIT, 1.6).clip
 
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory):
-    with in_64_bit():
-        return make_trials(tmp_path_factory.mktemp("clip"))
+    return make_trials(tmp_path_factory.mktemp("clip"))
 
 
 @pytest.fixture(scope="module")
 def found(trials, clip):
-    with in_64_bit():
-        seen = trials.problems[0].observation
-        measured = Measurement(clip, seen, seen)
-        made = diagnosis_of(trials, "ambiguous")
-        return Diagnosis((measured,), trials, made, {"clips": ["oracle.csv"]}, "galileo diagnose")
+    seen = trials.problems[0].observation
+    measured = Measurement(clip, seen, seen)
+    made = diagnosis_of(trials, "ambiguous")
+    return Diagnosis((measured,), trials, made, {"clips": ["oracle.csv"]}, "galileo diagnose")
 
 
 def test_what_is_not_set_stays(trials, clip):
