@@ -54,7 +54,7 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 from galileo_jax.simulation.truth import Truth
-from galileo_jax.thesis.estimate import thesis_posterior
+from galileo_jax.thesis.sampler import thesis_posterior
 
 NOISE_M_S = 0.01
 NOISE_M = NOISE_M_S / (tracks.FPS * math.sqrt(2))

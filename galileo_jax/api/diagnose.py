@@ -21,7 +21,7 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
-from galileo_jax.diagnosis.laws.source import proposed_file
+from galileo_jax.diagnosis.laws.grammar import proposed_file
 from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.experiment.choose import with_next
 from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs

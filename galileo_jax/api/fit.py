@@ -414,7 +414,7 @@ def _by_network(problem: JointProblem, options: FitOptions) -> _Found:
 def _by_thesis(problem: JointProblem, options: FitOptions) -> _Found:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     from galileo_jax.model.parameters import inverse
-    from galileo_jax.thesis.estimate import thesis_posterior
+    from galileo_jax.thesis.sampler import thesis_posterior
 
     chosen = {name: getattr(options, name) for name in OF_THESIS}
     posterior, best = thesis_posterior(

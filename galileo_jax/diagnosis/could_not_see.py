@@ -55,8 +55,8 @@ def could_not_see(
 
 def smallest_shown(
     power: float, num_left: float, prior: Prior, absent: float, log_prior: float, needed: float
-) -> float | None:
-    """The smallest strength whose expected log odds convince; None where none does.
+) -> float:
+    """The smallest strength whose expected log odds convince; infinite where none does.
 
     Args:
       power: squared length of the slope to a strength of 1, in units of the noise.
@@ -71,8 +71,7 @@ def smallest_shown(
     sd_z = 1 / np.sqrt(1 + power * wide**2)
     gain = 0.5 * num_left * np.log1p(power * (strength - absent) ** 2 / num_left)
     odds = gain - 0.5 * PRIOR_Z**2 + np.log(sd_z) + log_prior
-    shown = np.abs(strength - absent)[odds >= needed]
-    return float(shown.min()) if shown.size else None
+    return float(np.min(np.abs(strength - absent)[odds >= needed], initial=np.inf))
 
 
 def _entry(
@@ -84,8 +83,7 @@ def _entry(
     effects = (*last.effects, effect)
     _, probes = shapes_beside(trials, last.fit, effects, seed)
     found = _smallest(trials, last.fit, probes, where, log_prior)
-    shown = float(np.median([np.inf if one is None else one for one in found]))
-    unit = own.unit
+    shown, unit = float(np.median(found)), own.unit
     constants: Mapping[str, str] = force_constants(trials)
     if effect in constants and "m1" in trials.names and not is_any_weighed(trials):
         theta = trials.theta(last.fit.z, last.fit.free)
@@ -94,18 +92,14 @@ def _entry(
 
 
 def _smallest(
-    trials: JointProblem,
-    fit: GradientFit,
-    probes: np.ndarray,
-    where: np.ndarray,
-    log_prior: float,
-) -> list[float | None]:
+    trials: JointProblem, fit: GradientFit, probes: np.ndarray, where: np.ndarray, log_prior: float
+) -> np.ndarray:
     """Of each probe (a shape of the effect), by slopes that are taken nearer and nearer to it."""
     own = trials.model_parameters[where[0]]
     probes = probes.copy()
     num_left = max(fit.num_values - fit.num_used, 1.0)
     needed = CONVINCING if fit.sizes is None else DECISIVE
-    found: list[float | None] = [None] * len(probes)
+    found = np.full(len(probes), np.inf)
     for _ in range(ROUNDS):
         _, power = slopes_along(trials, fit, probes)
         size = probes[:, where[0]] - own.absent
@@ -114,6 +108,6 @@ def _smallest(
         for i, squared in enumerate(shown):
             tried = float(squared), num_left, own.prior, own.absent, log_prior, needed
             found[i] = smallest_shown(*tried)
-            if (strength := found[i]) is not None:
-                probes[i, where] = own.absent + strength
+            if np.isfinite(found[i]):
+                probes[i, where] = own.absent + found[i]
     return found

@@ -71,7 +71,7 @@ def _says(one: Mapping[str, Any]) -> tuple[str, Any]:
     law = one.get("law") if one["status"] == "law" else None
     if law is None:
         return one["status"], one["effects"]
-    # What a formula changes stands in its effect's name (`laws.source.name_of`). One passage does
+    # What a formula changes stands in its effect's name (`laws.grammar.name_of`). One passage does
     # not tell a push from a change of friction; passages at several slopes do.
     is_friction = [name.startswith("law_friction_") for name in one["effects"]]
     return one["status"], (law["family"], is_friction)

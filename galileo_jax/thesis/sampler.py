@@ -1,6 +1,7 @@
-"""The thesis's sampler: short chains of uniform proposals, and the best sample wins."""
+"""The thesis's estimator: short chains of uniform proposals; the best sample wins."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from typing import ClassVar, NamedTuple
 
@@ -9,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
 from galileo_jax.inference.samplers.driver import Settings, sample
@@ -19,7 +21,10 @@ from galileo_jax.inference.samplers.sampler import (
     State,
     turn_of_one,
 )
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.thesis.similarity import similarity_class
 
+SEARCHED = ("m1", "k1", "m2", "k2")
 NUM_CHAINS = 16
 NUM_STEPS = 75
 NARROW = 0.05
@@ -133,7 +138,7 @@ class ThesisResult(NamedTuple):
 def infer(
     key: jax.Array,
     log_similarity: LogDensity,
-    names: Sequence[str] = ("m1", "k1", "m2", "k2"),
+    names: Sequence[str] = SEARCHED,
     *,
     acceptance: Acceptance = Acceptance.COIN,
     selection: Selection = Selection.BEST,
@@ -169,3 +174,53 @@ def select(posterior: Posterior, selection: Selection) -> np.ndarray:
 
 def _interval(position, half_width):
     return jnp.maximum(position - half_width, 0.0), jnp.minimum(position + half_width, 1.0)
+
+
+def thesis_posterior(
+    trials: JointProblem,
+    seed: int,
+    similarity: str,
+    acceptance: str,
+    selection: str,
+    num_chains: int = NUM_CHAINS,
+) -> tuple[Posterior, dict[str, float]]:
+    """Runs the thesis's 16 x 75 steps, or 75 of another number of chains.
+
+    Everything but the masses and frictions stays at its prior's middle, as in the thesis.
+
+    Returns:
+      All chain states (with the coin's acceptance no posterior), and the thesis's answer.
+
+    Raises:
+      InputError: the clip does not have two objects.
+    """
+    (problem,) = trials.problems
+    if not set(SEARCHED) <= set(trials.names):
+        raise InputError("--preset thesis: two objects expected; this clip has one")
+    measure = similarity_class(similarity)()
+    observation = problem.observation
+    both = observation.mask[:, 1:] & observation.mask[:, :-1]
+    dt = jnp.asarray(np.diff(observation.times_s))
+    observed = jnp.asarray(np.where(both[:, None], np.nan_to_num(observation.velocity_m_s), 0.0))
+    where = np.array([trials.names.index(name) for name in SEARCHED])
+    rest_theta = trials.theta(np.zeros(len(trials.names)))
+    rest = jnp.asarray(trials.of_clip(rest_theta, 0))
+
+    def log_similarity(theta: jax.Array) -> jax.Array:
+        predicted = problem.predict(rest.at[where].set(theta))
+        velocity = jnp.diff(predicted, axis=-1) / dt
+        return measure(velocity, observed, jnp.asarray(both))
+
+    answer = infer(
+        jax.random.key(seed),
+        log_similarity,
+        SEARCHED,
+        acceptance=Acceptance(acceptance),
+        selection=Selection(selection),
+        num_chains=num_chains,
+    )
+    draws = answer.posterior.draws
+    whole = np.tile(rest_theta, (*draws.shape[:2], 1))
+    whole[..., where] = draws
+    posterior = replace(answer.posterior, names=trials.names, draws=whole)
+    return posterior, dict(zip(SEARCHED, map(float, answer.estimate), strict=True))

@@ -19,7 +19,7 @@ def views(monkeypatch) -> Any:
     away = (TIMES - 0.5) / 0.1
     seen = sight(3.0 * away * np.exp(-(away**2)))
     monkeypatch.setattr(rank_formulas.Sight, "of", lambda view: seen)
-    monkeypatch.setattr(rank_formulas, "_ranges", lambda views: RANGES)
+    monkeypatch.setattr(rank_formulas, "ranges_of", lambda views: RANGES)
     surroundings = SimpleNamespace(has_surface=True, names=("object1", "object2"))
     return [
         SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings)))

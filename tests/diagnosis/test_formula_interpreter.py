@@ -15,8 +15,7 @@ from galileo_jax.diagnosis.laws.formula_interpreter import (
     Spare,
     codes_of,
 )
-from galileo_jax.diagnosis.laws.grammar import structures
-from galileo_jax.diagnosis.laws.source import CLASS, law_class, name_of
+from galileo_jax.diagnosis.laws.grammar import CLASS, law_class, name_of, structures
 from galileo_jax.model.effects.effect import State
 from galileo_jax.rollout.engine_jax import _roll_out_batch
 from galileo_jax.rollout.engine_path import EnginePath

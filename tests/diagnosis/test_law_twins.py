@@ -9,8 +9,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.laws.fit_formulas import FittedLaw, _with_laws, without_twins
-from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
-from galileo_jax.diagnosis.laws.source import class_source, name_of
+from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, class_source, name_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.model.parameters import inverse
@@ -30,7 +29,7 @@ def clip_of_two(tmp_path_factory):
 
 def law(trials, truth, structure: Structure, tau: float, evidence: float) -> FittedLaw:
     """As if it had been fitted: friction twice as large at first."""
-    name, source = name_of(structure), class_source(structure, [])
+    name, source = name_of(structure), class_source(structure, {})
     own = _with_laws(trials, [structure], [source])
     values = truth | {name: 0.5, f"{name}_tau": tau}
     for k in ("k1", "k2") if structure.is_on_all else ("k1",):

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from galileo_jax.diagnosis.diagnosis import Law as FoundLaw
-from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, structures, without_one_factor
-from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of, proposed_file
+from galileo_jax.diagnosis.laws.grammar import (
+    FACTORS,
+    Structure,
+    class_source,
+    law_class,
+    name_of,
+    proposed_file,
+    structures,
+    without_one_factor,
+)
 from galileo_jax.model.effects import registry
 from galileo_jax.model.effects.effect import State
 from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
@@ -31,7 +39,7 @@ def theta(structure, strength, **constants):
 
 
 def effect(structure) -> Any:
-    return law_class(class_source(structure, ()))()
+    return law_class(class_source(structure, {}))()
 
 
 def test_a_drag_of_a_power():
@@ -123,12 +131,12 @@ def test_the_file_is_an_effect_of_its_own(tmp_path, monkeypatch):
     entries = registry.effect_registry._entries
     monkeypatch.setattr(registry.effect_registry, "_entries", dict(entries))
     text = "a = -0.6 |v|^1.5 sign(v), all objects"
-    source = class_source(DRAG, ()).replace(name_of(DRAG), "law_of_a_test")
+    source = class_source(DRAG, {}).replace(name_of(DRAG), "law_of_a_test")
     found = FoundLaw(text, DRAG.family, source, {"c": "0.6", "n": "1.5"})
     path = tmp_path / "proposed_effect.py"
     path.write_text(proposed_file(found, ["clip.csv"]))
     assert path.read_text().startswith(f'"""{text}\n')
-    assert len(class_source(DRAG, ()).splitlines()) <= 10
+    assert len(class_source(DRAG, {}).splitlines()) <= 10
     assert load_file(path) == ("law_of_a_test",)
     (made,) = make_effects(["law_of_a_test"])
     assert [p.name for p in made.parameters(SCENE)] == ["law_of_a_test", "law_of_a_test_n"]

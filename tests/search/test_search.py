@@ -12,8 +12,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.laws.fit_formulas import _with_laws
-from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
-from galileo_jax.diagnosis.laws.source import class_source, name_of
+from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, class_source, name_of
 from galileo_jax.diagnosis.stakes import VerdictStakes, log_prior
 from galileo_jax.diagnosis.thresholds import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -162,7 +161,7 @@ def from_truth(trials: JointProblem, values, effects) -> Hypothesis:
 def test_an_effect_that_was_missed_is_found_from_its_own_formula(rubs_at_low_speed):
     table, truth = rubs_at_low_speed
     own = truth["effect_parameters"]
-    source, name = class_source(STRIBECK_S_FORMULA, []), name_of(STRIBECK_S_FORMULA)
+    source, name = class_source(STRIBECK_S_FORMULA, {}), name_of(STRIBECK_S_FORMULA)
     values = {name: own["stribeck"], f"{name}_speed": own["stribeck_speed"]}
     with in_64_bit():
         others = _with_laws(table.trials, [STRIBECK_S_FORMULA], [source])

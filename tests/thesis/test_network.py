@@ -5,12 +5,14 @@ import pytest
 from flax import nnx
 
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.thesis.network import (
+from galileo_jax.thesis.task import (
+    CM,
+    OBJECT2_M,
     Convolution,
     ThesisNetwork,
+    ThesisTask,
     average_pool,
 )
-from galileo_jax.thesis.task import CM, OBJECT2_M, ThesisTask
 from tests.ramp_model import HIT
 
 THESIS_PARAMETERS = 13_252

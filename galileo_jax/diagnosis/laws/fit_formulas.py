@@ -9,16 +9,22 @@ import numpy as np
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.laws.formula_interpreter import MOST_NUMBERS, ActingFormulas, Spare
-from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
+from galileo_jax.diagnosis.laws.grammar import (
+    Structure,
+    class_source,
+    law_class,
+    name_of,
+    without_one_factor,
+)
 from galileo_jax.diagnosis.laws.linearised_clip import accelerations, masses_and_frictions
 from galileo_jax.diagnosis.laws.rank_formulas import (
     NUM_LAWS,
     Shape,
     Suggestion,
     of_family,
+    ranges_of,
     suggestions,
 )
-from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
@@ -153,7 +159,8 @@ def _fitted(
     """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
         return []
-    sources = [class_source(one.structure, views) for one in found]
+    ranges = ranges_of(views)
+    sources = [class_source(one.structure, ranges) for one in found]
     extended = _with_laws(trials, [one.structure for one in found], sources)
     fitter, count = GradientFitter(extended), len(extended.model_parameters)
     where = [extended.names.index(name) if name in extended.names else -1 for name in trials.names]

@@ -1,4 +1,4 @@
-"""The formulas that are tried: a nature, whom it acts on, and one or two factors.
+"""The formulas that are tried: a nature, whom it acts on, and one or two factors; and their files.
 
 A factor is a shape in time, in place or in speed with a few constants: a power, a decay, a wave, a
 pulse, a step, a pull to a place. Time counts in seconds, place in metres, speed in metres a
@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.model.effects.law import Nature
+from galileo_jax.diagnosis.diagnosis import Law as FoundLaw
+from galileo_jax.model.effects.law import Law, Nature
 from galileo_jax.model.parameters import LogNormal, Normal, Prior, Uniform
 
 Variable = str  # "t", "q" or "v"
@@ -302,3 +303,66 @@ def without_one_factor(
         constants["c"] = values["c"] * (1.0 if nature == structure.nature else -1.0)
         found.append((Structure(nature, structure.is_on_all, (factor,)), constants))
     return found
+
+
+IMPORTS = """from galileo_jax.model.effects.law import Law
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Normal, Uniform
+"""
+CLASS = '''@register
+class ProposedLaw(Law):
+    """{text}."""
+
+    name = "{name}"
+    nature, is_on_all = "{nature}", {is_on_all}
+    constants = {{{constants}}}
+
+    def formula(self, t, q, v, xp{arguments}):
+        return {code}
+'''
+
+
+def name_of(structure: Structure) -> str:
+    """`law_drag_power_v_all`."""
+    shape = "_".join(factor.label for factor in structure.factors)
+    return f"law_{structure.nature}_{shape}" + ("_all" if structure.is_on_all else "")
+
+
+def class_source(structure: Structure, ranges: Mapping[Variable, tuple[float, float]]) -> str:
+    """The class that registers itself; `ranges` are those of constants without a prior."""
+    constants = []
+    for name, (factor, constant) in structure.constants.items():
+        prior = constant.prior
+        if prior is None:
+            prior = Uniform(*(round(end, 3) for end in ranges[factor.variable]))
+        constants.append(f'"{name}": ("{constant.unit}", {prior!r})')
+    return CLASS.format(
+        text=structure.text(),
+        name=name_of(structure),
+        nature=structure.nature,
+        is_on_all=structure.is_on_all,
+        constants=", ".join(constants),
+        arguments="".join(f", {name}" for name in structure.constants),
+        code=structure.code,
+    )
+
+
+def proposed_file(law: FoundLaw, clips: Sequence[str]) -> str:
+    """`proposed_effect.py`."""
+    values = ", ".join(f"{name} = {value}" for name, value in law.constants.items())
+    head = f'"""{law.text}\n\nProposed by galileo diagnose {" ".join(clips)}\nwith {values}.\n"""\n'
+    return f"{head}\n{IMPORTS}\n\n{law.source}"
+
+
+def law_class(source: str) -> type[Law]:
+    """The class of `class_source`, not registered: the library is what it was."""
+    names = {
+        "Law": Law,
+        "LogNormal": LogNormal,
+        "Normal": Normal,
+        "Uniform": Uniform,
+        "register": lambda law: law,
+        "__name__": __name__,
+    }
+    exec(compile(source, "<proposed law>", "exec"), names)
+    return names["ProposedLaw"]  # pyright: ignore

@@ -68,7 +68,7 @@ def _suggested(views: Sequence[View], family: str | None = None) -> list[Suggest
     """All formulas that show, or those of one family."""
     sights = [Sight.of(view) for view in views]
     scene = views[0].model.scene.surroundings
-    ranges = _ranges(views)
+    ranges = ranges_of(views)
     return [
         one
         for structure in structures(scene.has_surface, len(scene.names))
@@ -119,7 +119,7 @@ def _best_of(found: Sequence[Suggestion], shape: Shape) -> list[Suggestion]:
     return sorted(alike, key=lambda one: one.structure.is_on_all != is_on_all)[:1]
 
 
-def _ranges(views: Sequence[View]) -> dict[str, tuple[float, float]]:
+def ranges_of(views: Sequence[View]) -> dict[str, tuple[float, float]]:
     """What of time and place is seen in motion."""
     times = np.concatenate([view.time_s[view.moves.any(axis=0)] for view in views])
     places = np.concatenate([view.path_m[view.moves] for view in views])
@@ -131,12 +131,6 @@ def _ranges(views: Sequence[View]) -> dict[str, tuple[float, float]]:
         # What acts from afar may stand beyond the way.
         "q": (float(places.min()) - 0.3 * reach, float(places.max()) + 0.3 * reach),
     }
-
-
-def constant_range(structure: Structure, views: Sequence[View], name: str) -> tuple[float, float]:
-    """Over which a constant without a prior of its own is uniform."""
-    factor, _ = structure.constants[name]
-    return _ranges(views)[factor.variable]
 
 
 def _grid(structure: Structure, ranges: Mapping[str, tuple[float, float]]) -> dict[str, np.ndarray]:
