@@ -22,8 +22,8 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.tracking.pixel_csv import write_pixel_csv
 from galileo_jax.tracking.track import Track as PixelTrack
+from galileo_jax.tracking.track import write_pixel_csv
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -27,22 +27,17 @@ from galileo_jax.runtime.errors import InputError
 LEVEL_SD_DEG = 0.5
 """How level a camera stands on a tripod, and how straight a lens draws: the error that the points'
 own scatter does not show."""
-MAX_SCATTER_SD_DEG = 2.0
-"""A path that tells its slope no better than this does not tell it."""
+MAX_SCATTER_SD_DEG = 2.0  # A path that tells its slope no better than this does not tell it
 UPPER_SHARE = 0.75
 """Of the way down to the table; further down the object's front is on the table already."""
-MIN_POINTS = 5
-"""On a line, or on either side of a bend."""
-MIN_BEND_DEG = 4.0
-"""A path that bends by less shows no foot."""
+MIN_POINTS = 5  # on a line, or on either side of a bend
+MIN_BEND_DEG = 4.0  # A path that bends by less shows no foot
 BEGIN_SHARE, LEAST_BEND = 0.5, 0.01
 """Of the way: its begin; by how many rad, at least, a valley's slope changes there."""
 SIZE_SD_M = 0.003
 """A marked point is the centre within this, and a height or a distance of centres no better."""
-NUM_BESIDE = 3
-"""Frames on either side of a hit through which the distance's two lines are laid."""
-CLEARLY = 5.0
-"""Standard deviations by which an object must move to have been hit."""
+NUM_BESIDE = 3  # frames on either side of a hit through which the distance's two lines are laid
+CLEARLY = 5.0  # standard deviations by which an object must move to have been hit
 
 
 @dataclass(frozen=True)

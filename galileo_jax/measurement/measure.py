@@ -34,8 +34,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
-LEAST_FRAMES, LEAST_SHARE = 8, 0.5
-"""Of a clip, that tell whether a model describes it."""
+LEAST_FRAMES, LEAST_SHARE = 8, 0.5  # of a clip, that tell whether a model describes it
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from galileo_jax.observation.observation import Observation
 
 CLEAR = 4.0
 TURNED_DEG = 6.0
-NEARER = 3.0
-"""By so many times an axis of a table must be nearer to the path than the declared way."""
+NEARER = 3.0  # by so many times an axis of a table must be nearer to the path than the declared way
 STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
 

@@ -30,10 +30,8 @@ from galileo_jax.observation.observation import Observation
 LARGEST_M, LASTS_S = 4e-4, 0.3
 """Standard deviation and duration of the wander in a clip of which nothing is known; the likelihood
 takes it so where an observation does not tell."""
-IN_SPACE_M, IN_SPACE_S = 2e-3, 0.15
-"""The same of a track in space."""
-SIZES = np.geomspace(1 / 300, 1.0, 16)
-"""Tried, of the largest."""
+IN_SPACE_M, IN_SPACE_S = 2e-3, 0.15  # the same of a track in space
+SIZES = np.geomspace(1 / 300, 1.0, 16)  # tried, of the largest
 SCALES, SCALE_SD = np.geomspace(0.4, 2.5, 7), 0.5
 """Of the stated errors, and the standard deviation of their logarithm."""
 PATHS = np.geomspace(1e-1, 1e7, 13)

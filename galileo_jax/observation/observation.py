@@ -14,8 +14,7 @@ still small enough for the other's to keep its digits in one covariance."""
 
 AWAY_SD, AWAY_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
 STANDING_FRAMES = 5  # that say where it stood
-LEAST_SD_M = 1e-6
-"""Smaller errors do not keep their digits beside it."""
+LEAST_SD_M = 1e-6  # smaller errors do not keep their digits beside it
 
 
 def stretches(chosen: Bool[np.ndarray, " frame"]) -> list[slice]:

@@ -35,18 +35,14 @@ def track_clip(clip: Clip) -> Track:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
     passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
     total, done = passes * max(clip.frame_count, 1), itertools.count(1)
-
     names = [item.name for item in clip.objects]
-
     view = None if clip.is_camera_plain else square_view(clip)
-    square = clip if view is None else view.clip(clip)
 
     def advance(seen: Seen | None = None) -> None:
         partial = None
         if seen is not None:
-            places = dict(zip(names, seen.places_px, strict=True))
-            if view is not None:
-                places = {name: view.shown(place) for name, place in places.items()}
+            shown = seen.places_px if view is None else map(view.shown, seen.places_px)
+            places = dict(zip(names, shown, strict=True))
             partial = {"frame": {"index": seen.frame, "places_px": places}}
         report("tracking", next(done) / total, partial)
 
@@ -54,9 +50,10 @@ def track_clip(clip: Clip) -> Track:
         frames = decode.frames(video)
         return frames if view is None else view.drawn(frames)
 
+    square = clip if view is None else view.clip(clip)
     if passes == 3:
         square = _with_points(square, open_frames, advance)
-    starts = [_start(square, item) for item in square.objects if item.point_px is not None]
+    starts = [_start(square, item) for item in square.objects]
     coding = Coding(decode.predicted_from_before(video))
     if view is not None:
         coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
@@ -68,14 +65,14 @@ def track_clip(clip: Clip) -> Track:
 def _start(clip: Clip, item: ClipObject) -> Start:
     """Where an object is first seen, and where somebody has put it right."""
     assert item.point_px is not None
-    later = []
-    for frame, *point in sorted(item.corrections):
-        there = item.model_copy(update={"point_px": tuple(point)})
-        later.append(Start(item.name, (point[0], point[1]), outline_of(clip, there), frame))
-    return Start(
-        item.name, item.point_px, outline_of(clip, item), item.first_frame or 0, item.last_frame,
-        tuple(later),
-    )  # fmt: skip
+
+    def seen_at(point_px: tuple[float, float], frame: int) -> Start:
+        there = item.model_copy(update={"point_px": point_px})
+        return Start(item.name, point_px, outline_of(clip, there), frame)
+
+    first = seen_at(item.point_px, item.first_frame or 0)
+    later = tuple(seen_at((x, y), frame) for frame, x, y in sorted(item.corrections))
+    return replace(first, last_frame=item.last_frame, corrections=later)
 
 
 def _with_points(
@@ -120,17 +117,16 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
     scale = clip.pixels_per_metre
     if item.size_m is None or scale is None:
         return Outline(None, angle)
+    radius, *others = item.size_m
     match item.shape:
         case "box":
-            return Outline((item.size_m[0] * scale, item.size_m[2] * scale), angle)
-        case "sphere":
-            side = 2 * item.size_m[0]
-        case "cylinder" if SCENARIOS[clip.scenario].is_level:
-            side = 2 * item.size_m[0]  # a puck lies flat, and is seen from above
-        case "cylinder":
-            side = min(2 * item.size_m[0], item.size_m[1])
+            return Outline((radius * scale, others[-1] * scale), angle)
+        case "cylinder" if not SCENARIOS[clip.scenario].is_level:
+            side = min(2 * radius, others[0])
         case "torus":
-            side = 2 * item.size_m[1]
+            side = 2 * others[0]
+        case _:  # a sphere, or a puck, which lies flat and is seen from above
+            side = 2 * radius
     # A cylinder or torus may lie or stand: the disc that fits into it either way.
     return Outline((side * scale, side * scale), angle, is_round=True)
 

@@ -8,33 +8,30 @@ of a small ball in flight, it is the silhouette that goes farthest.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import product
 
 import cv2
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking.lucas_kanade import PYRAMID_LEVELS, follow_points
+from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
 WINDOW_PX = 13
-MOVED_PX = 3.0
-"""A feature that is this far from where it began has moved; noise reaches 1 px."""
+MOVED_PX = 3.0  # A feature that is this far from where it began has moved; noise reaches 1 px
 SAME_ONSET_FRAMES = 3
-SAME_WAY_PX = 3.0
-"""Features of one thing are displaced alike to this, while they turn little."""
-NEARER = 0.05
-"""Of a size in the picture: it may change by this, as the thing comes nearer."""
+SAME_WAY_PX = 3.0  # features of one thing are displaced alike to this, while they turn little
+NEARER = 0.05  # of a size in the picture: it may change by this, as the thing comes nearer
 MIN_FEATURES = 5
 LOOK_AHEAD_FRAMES = 3
 MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
-BORDER_SHARE = 0.03
-"""Share of the frame's width within which a thing counts as at the border."""
-LEAST_SEEN = 6
-"""Frames in which a silhouette is followed: fewer may be linked by chance."""
+BORDER_SHARE = 0.03  # share of the frame's width within which a thing counts as at the border
+LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked by chance
 
 
 @dataclass(frozen=True)
@@ -95,18 +92,18 @@ def find_movers(
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     movers = []
+    margin = BORDER_SHARE * size_px[0]
     for members in _groups(path, onset, span_px):
-        last = np.array([_last_seen(path[:, i]) for i in members])
-        margin = BORDER_SHARE * size_px[0]
+        places, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
         beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
         movers.append(
             Mover(
-                point_px=_middle(path[0, members], axes_angle_rad),
+                point_px=_middle(places, axes_angle_rad),
                 onset_frame=int(np.median(onset[members])),
                 num_features=len(members),
                 leaves_picture=bool(np.mean(beyond.any(axis=1)) > 0.3),
-                places_px=path[0, members],
-                goes_right=bool(np.median(last[:, 0] - path[0, members, 0]) >= 0),
+                places_px=places,
+                goes_right=bool(np.median(last[:, 0] - places[:, 0]) >= 0),
             )
         )
     if not movers:
@@ -120,18 +117,11 @@ def _silhouettes(open_frames: Callable[[], Iterable[np.ndarray]], count: int) ->
     found = max(paths, key=lambda one: one.way_px, default=None)
     if found is None or found.way_px < found.parts[0].size_px:
         return []
-    place, first = found.places_px, found.parts[0]
-    return [
-        Mover(
-            point_px=(float(place[0, 0]), float(place[0, 1])),
-            onset_frame=found.frames[0],
-            num_features=0,
-            leaves_picture=False,
-            places_px=np.stack([first.low_px, first.high_px]).astype(float),
-            goes_right=bool(place[-1, 0] >= place[0, 0]),
-            first_frame=found.frames[0],
-        )
-    ]
+    first, frame, last = found.parts[0], found.frames[0], found.parts[-1]
+    x, y = first.centre_px
+    corners = np.stack([first.low_px, first.high_px]).astype(float)
+    goes_right = bool(last.centre_px[0] >= x)
+    return [Mover((float(x), float(y)), frame, 0, False, corners, goes_right, frame)]
 
 
 def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:
@@ -188,49 +178,29 @@ def _followed(before: np.ndarray, after: np.ndarray, places: np.ndarray) -> np.n
 
 
 def _groups(path: np.ndarray, onset: np.ndarray, span_px: float) -> list[np.ndarray]:
-    """Features that began close together, set out together and went the same way."""
-    candidates = np.flatnonzero(onset >= 0)
-    later = np.minimum(onset[candidates] + LOOK_AHEAD_FRAMES, len(path) - 1)
-    groups: list[np.ndarray] = []
-    left = set(range(len(candidates)))
-    while left:
-        group, edge = set(), {left.pop()}
-        while edge:
-            i = edge.pop()
-            group.add(i)
-            feature = candidates[i]
-            others = np.array(sorted(left), dtype=int)
-            if not len(others):
-                continue
-            features = candidates[others]
-            near = np.linalg.norm(path[0, features] - path[0, feature], axis=1) < span_px / 2
-            together = np.abs(onset[features] - onset[feature]) <= SAME_ONSET_FRAMES
-            way = path[later[i], features] - path[0, features]
-            own = path[later[i], feature] - path[0, feature]
-            alike = np.linalg.norm(way - own, axis=1) < SAME_WAY_PX  # False where lost
-            joined = set(others[near & together & alike].tolist())
-            left -= joined
-            edge |= joined
-        groups.append(candidates[sorted(group)])
-    joined = _joined(path, onset, groups, span_px)
-    return [group for group in joined if len(group) >= MIN_FEATURES]
+    """Features of one thing each: they began close together, set out together, went the same way.
 
-
-def _joined(
-    path: np.ndarray, onset: np.ndarray, groups: list[np.ndarray], span_px: float
-) -> list[np.ndarray]:
-    """Groups joined where they are parts of one thing: its plain middle has no features.
-
-    Parts set out together from places less than 2 `span_px` apart, and keep their distance.
+    Groups are joined where they are parts of one thing, whose plain middle has no features: parts
+    set out together from places less than 2 `span_px` apart, and keep their distance.
     """
+    moving = np.flatnonzero(onset >= 0)
+    later = np.minimum(onset[moving] + LOOK_AHEAD_FRAMES, len(path) - 1)
+    began = path[0, moving]
+    near = np.linalg.norm(began[:, None] - began, axis=2) < span_px / 2
+    together = np.abs(onset[moving, None] - onset[moving]) <= SAME_ONSET_FRAMES
+    way = path[later[:, None], moving] - began  # [whose frame, feature, axis]
+    own = way[np.arange(len(moving)), np.arange(len(moving))]
+    alike = np.linalg.norm(way - own[:, None], axis=2) < SAME_WAY_PX  # False where lost
+    count, label = connected_components(near & together & alike, directed=False)
+    groups = [moving[label == k] for k in range(count)]
     whole: list[np.ndarray] = []
-    for group in sorted(groups, key=len, reverse=True):
-        one, parts = group, whole
+    for one in sorted(groups, key=len, reverse=True):
+        parts = whole
         while mine := [part for part in parts if _is_one_thing(path, onset, part, one, span_px)]:
             parts = [part for part in parts if all(part is not other for other in mine)]
             one = np.sort(np.concatenate([one, *mine]))
         whole = [*parts, one]
-    return whole
+    return [group for group in whole if len(group) >= MIN_FEATURES]
 
 
 def _is_one_thing(
@@ -285,23 +255,15 @@ def fit_outline(image: np.ndarray, places: np.ndarray, outline: Outline) -> tupl
     patch = patch_at(image, np.array([*(turn @ middle), outline.angle_rad]), radius)
     patch = cv2.GaussianBlur(patch, (0, 0), 0.8)
     across = np.abs(cv2.Sobel(patch, cv2.CV_32F, 1, 0)), np.abs(cv2.Sobel(patch, cv2.CV_32F, 0, 1))
-    half = size / 2
 
     def sharpness(shift: np.ndarray) -> float:
-        left, top = np.round(radius + shift - half).astype(int)
-        right, bottom = np.round(radius + shift + half).astype(int)
-        sides = (
-            across[0][top:bottom, left],
-            across[0][top:bottom, right],
-            across[1][top, left:right],
-            across[1][bottom, left:right],
-        )
+        left, top = np.round(radius + shift - size / 2).astype(int)
+        right, bottom = np.round(radius + shift + size / 2).astype(int)
+        sides = [across[0][top:bottom, x] for x in (left, right)]
+        sides += [across[1][y, left:right] for y in (top, bottom)]
         return float(np.mean([side.mean() for side in sides]))
 
-    shifts = [
-        np.array([x, y])
-        for x in np.arange(-slack[0], slack[0] + 0.5, 0.5)
-        for y in np.arange(-slack[1], slack[1] + 0.5, 0.5)
-    ]
-    x, y = turn @ (middle + max(shifts, key=sharpness))
+    x, y = (np.arange(-most, most + 0.5, 0.5) for most in slack)
+    best = max((np.array(shift) for shift in product(x, y)), key=sharpness)
+    x, y = turn @ (middle + best)
     return float(x), float(y)

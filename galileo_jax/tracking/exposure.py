@@ -2,40 +2,33 @@
 
 import numpy as np
 
+from galileo_jax.tracking.alignment import FINE_PX, align
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import FINE_PX, align
+from galileo_jax.tracking.pose import length, own_motion
 from galileo_jax.tracking.template import Template
 
 SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
-MIN_SPEED_PX = 3.0
-"""Slower than this per frame, the smear is too short to measure."""
+MIN_SPEED_PX = 3.0  # slower than this per frame, the smear is too short to measure
 UNLEARNT = (0.0, 0.25, 0.5)
 """Shares that are tried one after the other while fewer than `LEARNT_FRAMES` frames count."""
 LEARNT_FRAMES = 3
-SAME_MOTION_PX = 0.3
-"""Motions during the exposure that differ by less are not tried separately."""
+SAME_MOTION_PX = 0.3  # motions during the exposure that differ by less are not tried separately
 ENOUGH_PX2 = 15e3
 """After moving frames whose speeds' squares add up to this, the share is known to some percent;
 more would only take time. A slow object needs more frames than a fast one."""
 
 
-def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
-    """A pose's change per frame `(dx, dy, dangle)`, its shift turned into the object's axes."""
-    return np.array([*(rotation(angle_rad).T @ velocity[:2]), velocity[2]])
-
-
 def distinct(motions: list[np.ndarray], radius: int) -> list[np.ndarray]:
     """The `motions` during an exposure that smear a patch of this radius differently."""
+
+    def apart_px(motion: np.ndarray) -> float:
+        return length(motion) + abs(motion[2]) * radius / 2
+
     kept: list[np.ndarray] = []
     for motion in motions:
-        if all(_distance(motion - other, radius) >= SAME_MOTION_PX for other in kept):
+        if all(apart_px(motion - other) >= SAME_MOTION_PX for other in kept):
             kept.append(motion)
     return kept
-
-
-def _distance(motion: np.ndarray, radius: int) -> float:
-    return float(np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2)
 
 
 class Exposure:
@@ -76,9 +69,8 @@ class Exposure:
         A template that is smeared itself tells by how much more or less the picture is, not how
         long the shutter is open.
         """
-        speed_px = float(np.hypot(*velocity[:2]))
-        is_slow, is_enough = speed_px < MIN_SPEED_PX, self.told_px2 >= ENOUGH_PX2
-        if is_slow or not template.is_sharp or is_enough:
+        speed_px, is_enough = length(velocity), self.told_px2 >= ENOUGH_PX2
+        if speed_px < MIN_SPEED_PX or not template.is_sharp or is_enough:
             return
         self.frames += 1
         self.told_px2 += speed_px**2

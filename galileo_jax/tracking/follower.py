@@ -4,10 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import MIN_SPEED_PX, Exposure, distinct, own_motion
-from galileo_jax.tracking.lucas_kanade import follow
+from galileo_jax.tracking.alignment import FINE_PX, Fit, align
+from galileo_jax.tracking.exposure import MIN_SPEED_PX, Exposure, distinct
+from galileo_jax.tracking.features import follow, rigid_motion
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pose import patch_at, rotation
+from galileo_jax.tracking.pose import length, own_motion, patch_at, rotation
 from galileo_jax.tracking.redetect import (
     SURE,
     TURNS_RAD,
@@ -17,8 +18,6 @@ from galileo_jax.tracking.redetect import (
     candidate_poses,
     is_alike,
 )
-from galileo_jax.tracking.refine import FINE_PX, Fit, align
-from galileo_jax.tracking.rigid import rigid_motion
 from galileo_jax.tracking.template import Template, median_template
 
 FOUND, FOUND_AGAIN = 0.75, 0.85
@@ -27,13 +26,11 @@ expected, or by a wide search."""
 REACH_SHARE = 0.2
 """Share of the frame's width searched to each side of where an object was lost: a thrown ball
 moves that far within a frame."""
-WORSE = 0.1
-"""A fit that correlates this much less than the one before is worth a wide search."""
+WORSE = 0.1  # A fit that correlates this much less than the one before is worth a wide search
 AS_EXPECTED_PX, AS_SEEN = 1.0, 0.02
 """An object that is this close to where it should be, and correlates by no more than this less than
 in the frame before, is not looked for by its features."""
-MAX_TURN_RAD = 0.7
-"""An object does not turn further between two frames in which it is seen."""
+MAX_TURN_RAD = 0.7  # an object does not turn further between two frames in which it is seen
 SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
 """After so many frames an object's velocity is known: it can then be no farther from where it
 should be than a blow throws it, in each of so many frames of being hidden."""
@@ -46,15 +43,14 @@ HELD_SPEED_PX, HELD_SHARE = 1.0, 0.1
 was has stopped at once, or the video repeats a frame; the next frame tells."""
 AS_BEFORE = 0.3
 """Share of its path since by which what goes on after a repeated frame is off a steady motion."""
-SHARP_PX = 1.0
+PATCH_PX = 1.0
 """An object that moves less than this during the exposure gives a patch for the template."""
 CLICKED_PX, CLICKED_SHARE = 4.0, 0.5
 """How far from its centre, or at which share of its template's radius, one may click on it."""
 MAX_PATCHES = 32
 KNOWN_FROM = 2
 """Before this frame, counted from 0, nobody knows whether an object moved in its first."""
-HIT_GAIN = 2.0
-"""What is hit by something heavy, elastically, flies off with twice its speed."""
+HIT_GAIN = 2.0  # what is hit by something heavy, elastically, flies off with twice its speed
 SAME_PLACE = 0.5
 """Centres that are within this share of the smaller one's size: two objects are not there."""
 RENEWALS = frozenset(8 * 2**i for i in range(32))
@@ -69,10 +65,18 @@ class Follower:
     Attributes:
       template: from the first frame at first, hand and noise included.
       pose: the last one found.
+      exposure: of the video, shared by all objects.
       first_picture: the frame in which it began: the scene without it, elsewhere.
       velocity: change of the pose per usual step, extrapolated to the last one.
+      mean_velocity: over the step to the last one.
       poses: pose of every frame so far, NaN where not found.
       patches: sharp aligned patches, thinned evenly to at most `MAX_PATCHES`.
+      since: the last frame that showed where it is, in usual steps.
+      off_course_px: how far from where it should have been it was found last.
+      frames_before: that somebody has put it right in.
+      fastest_px: of the other objects, per frame.
+      is_alone: there is nothing that could strike it.
+      taken: places where other objects are in this frame.
     """
 
     template: Template
@@ -86,17 +90,17 @@ class Follower:
     correlation: float = 1.0
     frames_missed: int = 0
     frames_held: int = 0
-    since: float = 0.0  # the last frame that showed where it is, in usual steps
+    since: float = 0.0
+    off_course_px: float = 0.0
     stride: int = 1
     frames_sharp: int = 0
-    frames_before: int = 0  # that somebody has put it right in
-    fastest_px: float = 0.0  # of the other objects, per frame
-    is_alone: bool = True  # there is nothing that could strike it
-    taken: tuple[np.ndarray, ...] = ()  # places where other objects are in this frame
+    frames_before: int = 0
+    fastest_px: float = 0.0
+    is_alone: bool = True
+    taken: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self) -> None:
         self.first_pose = self.pose
-        self._off_course_px = 0.0
 
     @property
     def size_px(self) -> float:
@@ -106,21 +110,13 @@ class Follower:
     @property
     def speed_px(self) -> float:
         """How far it goes per frame, as last seen."""
-        return float(np.hypot(*self.velocity[:2]))
-
-    @property
-    def off_course_px(self) -> float:
-        """How far from where it should have been it was found last."""
-        return self._off_course_px
+        return length(self.velocity)
 
     def again(
         self, before: Picture | None, picture: Picture, taken: tuple[np.ndarray, ...]
     ) -> None:
         """Looks for the object anew in the frame of the last `step`, but not at `taken`."""
-        del self.poses[self._last["num_poses"] :]
-        for name, value in self._last.items():
-            if name != "num_poses":
-                setattr(self, name, value)
+        vars(self).update(self._last)
         self.taken = taken
         self.step(before, picture, self._step)
         self.taken = ()
@@ -133,46 +129,24 @@ class Follower:
           picture: the frame.
           step: the time between them, in usual steps.
         """
-        self._last = {name: getattr(self, name) for name in CHANGING} | {
-            "num_poses": len(self.poses), "patches": [*self.patches],
-        }  # fmt: skip
         self._step = step
+        lists = {"poses": [*self.poses], "patches": [*self.patches]}
+        self._last = {k: v for k, v in vars(self).items() if k != "_last"} | lists
         self.since += step
-        if self.frames_missed > LONG_GONE_FRAMES and self.frames_missed % LOOK_EVERY:
-            fit = None
-        else:
+        fit = None
+        if self.frames_missed <= LONG_GONE_FRAMES or self.frames_missed % LOOK_EVERY == 0:
             fit = self._near(before, picture)
         if fit is None or fit.correlation < min(SURE, self.correlation - WORSE):
-            fit = max((f for f in (fit, self._far(picture)) if f), key=_correlation, default=None)
+            both = (one for one in (fit, self._far(picture)) if one is not None)
+            fit = max(both, key=lambda one: one.correlation, default=None)
         if fit is None:
             self.poses.append(np.full(3, np.nan))
             self.frames_missed += 1
-            return
-        if self._is_held(fit):
+        elif self._is_held(fit):
             self.frames_held = 1
             self.poses.append(fit.pose)
-            return
-        if self.frames_held and not self.frames_missed and self._went_on(fit):
-            self.poses[-1] = np.full(3, np.nan)
-        self._off_course_px = float(np.hypot(*(fit.pose - self._expected())[:2]))
-        is_smooth = not self.frames_missed and not self._is_blow(fit.pose)
-        if before is not None:
-            # What is alone is never struck: it is smeared now as it was first, and its template
-            # is renewed from what it looks like on its way.
-            if len(self.poses) == KNOWN_FROM and not self.frames_before and not self.is_alone:
-                self._see_how_it_began(fit.pose)
-            self.velocity, self.mean_velocity = (
-                self._velocity_at(fit.pose),
-                (fit.pose - self.pose) / self.since,
-            )
-        self.correlation = fit.correlation
-        self.frames_missed = self.frames_held = 0
-        self.since = 0.0
-        self.pose = fit.pose
-        self.poses.append(fit.pose)
-        if self.is_alone or (len(self.poses) > KNOWN_FROM and is_smooth):
-            self.exposure.add(picture, self.template, self.pose, self.velocity)
-        self._keep(picture)
+        else:
+            self._goes_on(fit, picture, is_first=before is None)
 
     def put_right(self, picture: Picture, point_px: tuple[float, float]) -> bool:
         """Looks for the object around a point where somebody has seen it; False: it looks other.
@@ -182,15 +156,15 @@ class Follower:
         """
         turns = TURNS_RAD if self.template.shows_turns else (0.0,)
         upright = {float(self.pose[2]), float(self.first_pose[2])}
-        still = np.zeros(3)
         guesses = [
-            Guess(np.array([*point_px, angle + turn]), still) for angle in upright for turn in turns
+            Guess(np.array([*point_px, angle + turn]), np.zeros(3))
+            for angle in upright
+            for turn in turns
         ]
         fit = best_fit(picture, self.template, guesses)
-        is_there = np.hypot(*(fit.pose[:2] - point_px)) < max(
-            CLICKED_SHARE * self.template.radius, CLICKED_PX
-        )
-        if not (is_there and is_alike(fit) and fit.correlation >= FOUND):
+        most_px = max(CLICKED_SHARE * self.template.radius, CLICKED_PX)
+        is_it = is_alike(fit) and fit.correlation >= FOUND
+        if not is_it or length(fit.pose[:2] - point_px) >= most_px:
             return False
         self.poses.append(fit.pose)
         self.pose, self.correlation = fit.pose, fit.correlation
@@ -200,17 +174,35 @@ class Follower:
         self.frames_before = len(self.poses)
         return True
 
+    def _goes_on(self, fit: Fit, picture: Picture, is_first: bool) -> None:
+        """Takes a fit for where the object is."""
+        self.off_course_px = length(fit.pose - self._expected())
+        is_steady = self.off_course_px < AS_BEFORE * self.since * self.speed_px
+        if self.frames_held and not self.frames_missed and is_steady:
+            self.poses[-1] = np.full(3, np.nan)  # that frame repeats the one before it
+        mean, velocity, is_blow = self._velocity_to(fit.pose)
+        is_smooth = not self.frames_missed and not is_blow
+        if not is_first:
+            # What is alone is never struck: it is smeared now as it was first, and its template
+            # is renewed from what it looks like on its way.
+            if len(self.poses) == KNOWN_FROM and not self.frames_before and not self.is_alone:
+                self._see_how_it_began(fit.pose)
+            self.velocity, self.mean_velocity = velocity, mean
+        self.correlation = fit.correlation
+        self.frames_missed = self.frames_held = 0
+        self.since = 0.0
+        self.pose = fit.pose
+        self.poses.append(fit.pose)
+        if self.is_alone or (len(self.poses) > KNOWN_FROM and is_smooth):
+            self.exposure.add(picture, self.template, self.pose, self.velocity)
+        if self.speed_px * self.exposure.share <= PATCH_PX:
+            self._keep(patch_at(picture.grey, self.pose, self.template.radius))
+
     def _is_held(self, fit: Fit) -> bool:
         """Whether the object is shown where it was though it moved: first frame of a stop, too."""
-        speed, step = (np.hypot(*v[:2]) for v in (self.velocity, fit.pose - self.pose))
         is_first = not self.frames_held and not self.frames_missed
-        return bool(is_first and speed > HELD_SPEED_PX and step < HELD_SHARE * speed)
-
-    def _went_on(self, fit: Fit) -> bool:
-        """Whether the object is where a steady motion takes it."""
-        off = fit.pose - self._expected()
-        path = self.since * self.velocity
-        return bool(np.hypot(*off[:2]) < AS_BEFORE * np.hypot(*path[:2]))
+        step = length(fit.pose - self.pose)
+        return is_first and self.speed_px > HELD_SPEED_PX and step < HELD_SHARE * self.speed_px
 
     def _near(self, before: Picture | None, picture: Picture) -> Fit | None:
         """The best fit around where the object was, went, or is led to by its features."""
@@ -218,7 +210,7 @@ class Follower:
         if before is not None and not self.frames_missed:
             if (fit := self._as_expected(picture)) is not None:
                 return fit
-            reach = int(np.ceil(2 * self.since * np.hypot(*self.velocity[:2]))) + 16
+            reach = int(np.ceil(2 * self.since * self.speed_px)) + 16
             features = follow(before.grey, picture.grey, self.pose, self.template.region, reach)
             if (motion := rigid_motion(*features)) is not None:
                 angle, shift = motion
@@ -233,28 +225,26 @@ class Follower:
         motion = own_motion(self.velocity, expected[2])
         guess = self._compared(expected, motion, (self.exposure.share,))[0]
         fit = align(*guess.pair(picture, self.template, FINE_PX), expected)
-        is_there = np.hypot(*(fit.pose - expected)[:2]) < AS_EXPECTED_PX
-        is_it = is_alike(fit) and fit.correlation > max(SURE, self.correlation - AS_SEEN)
-        is_free = self._is_free(fit.pose)
-        return fit if is_there and is_it and is_free and not self._is_scene(picture, fit) else None
+        is_there = length(fit.pose - expected) < AS_EXPECTED_PX
+        least = max(SURE, self.correlation - AS_SEEN)
+        return fit if is_there and self._is_it(picture, fit, least) else None
 
     def _far(self, picture: Picture) -> Fit | None:
         """The best fit in a wide neighbourhood; rarely looked for while the object is gone."""
         missed = self.frames_missed
         if missed & (missed - 1):  # at once, after 1, 2, 4, 8, ... frames
             return None
-        reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(picture.size_px))
-        guesses = candidate_poses(picture.grey, self.template, self._expected(), float(reach))
-        if (fit := self._best(picture, guesses, FOUND_AGAIN)) is not None:
+        reach = max(2 * self.speed_px, REACH_SHARE * max(picture.size_px))
+        poses = candidate_poses(picture.grey, self.template, self._expected(), reach)
+        if (fit := self._best(picture, poses, FOUND_AGAIN)) is not None:
             return fit
-        most = max(float(np.hypot(*self.velocity[:2])), HIT_GAIN * self.fastest_px)
+        most = max(self.speed_px, HIT_GAIN * self.fastest_px)
         if self.is_alone or most < MIN_SPEED_PX:
             return None
-        blows = after_blow(
-            picture, self.template, self.pose, self.velocity, self.since,
-            tuple(filter(None, self.exposure.trials)), most,
-        )  # fmt: skip
-        return self._best_of(picture, blows, FOUND_AGAIN) if blows else None
+        shares = tuple(filter(None, self.exposure.trials))
+        last = self.pose, self.velocity, self.since
+        guesses = after_blow(picture, self.template, *last, shares, most)
+        return self._best_of(picture, guesses, FOUND_AGAIN)
 
     def _see_how_it_began(self, pose: np.ndarray) -> None:
         """Whether the object, now in its third frame, moved in its first, and how.
@@ -263,10 +253,9 @@ class Follower:
         """
         steps = np.diff([*self.poses, pose], axis=0)
         change = steps[1] - steps[0]
-        is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*steps[1][:2])
-        velocity = steps[0] - (0 if is_blow else change / 2)
+        velocity = steps[0] - (0 if length(change) > 0.5 * length(steps[1]) else change / 2)
         # NaN compares False: if it was not found in between nobody knows.
-        if np.hypot(*velocity[:2]) >= MIN_SPEED_PX:
+        if length(velocity) >= MIN_SPEED_PX:
             self.template = replace(self.template, moved=own_motion(velocity, self.first_pose[2]))
 
     def _compared(
@@ -277,41 +266,45 @@ class Follower:
         if template.is_sharp:
             smears = distinct([share * motion for share in shares], template.radius)
             return [Guess(pose, smear) for smear in smears]
-        if np.hypot(*(motion - template.moved)[:2]) < MIN_SPEED_PX:
+        if length(motion - template.moved) < MIN_SPEED_PX:
             return [Guess(pose, np.zeros(3))]
         return [Guess(pose, share * motion, share * template.moved) for share in shares]
 
     def _best(self, picture: Picture, poses: list[np.ndarray], least: float) -> Fit | None:
         """The best fit from the guessed `poses` if it can be the object."""
-        guesses: list[Guess] = []
-        for pose in poses:
-            motion = own_motion(self._velocity_at(pose), pose[2])
-            guesses += self._compared(pose, motion, self.exposure.trials)
-        return self._best_of(picture, guesses, least) if guesses else None
+        motions = [own_motion(self._velocity_to(pose)[1], pose[2]) for pose in poses]
+        guesses = [
+            guess
+            for pose, motion in zip(poses, motions, strict=True)
+            for guess in self._compared(pose, motion, self.exposure.trials)
+        ]
+        return self._best_of(picture, guesses, least)
 
     def _best_of(self, picture: Picture, guesses: list[Guess], least: float) -> Fit | None:
-        """The best fit from the guesses, at least one, if it can be the object."""
+        """The best fit from the guesses if it can be the object."""
+        if not guesses:
+            return None
         fit = best_fit(picture, self.template, guesses)
         width, height = picture.size_px
         is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
-        leaps = [np.hypot(*(fit.pose - p)[:2]) for p in (self.pose, self._expected())]
-        is_near = min(leaps) <= self._leap_px()
+        leap = min(length(fit.pose - place) for place in (self.pose, self._expected()))
         is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
-        is_it = is_alike(fit) and fit.correlation >= least and self._is_free(fit.pose)
-        is_possible = is_inside and is_near and is_upright and is_it
-        return fit if is_possible and not self._is_scene(picture, fit) else None
+        is_possible = is_inside and leap <= self._leap_px() and is_upright
+        return fit if is_possible and self._is_it(picture, fit, least) else None
 
-    def _is_free(self, pose: np.ndarray) -> bool:
-        """Whether no other object is there."""
+    def _is_it(self, picture: Picture, fit: Fit, least: float) -> bool:
+        """Whether it looks like the object, where no other one is and none like it stood before."""
         near = SAME_PLACE * self.size_px
-        return all(np.hypot(*(pose[:2] - place[:2])) > near for place in self.taken)
+        is_free = all(length(fit.pose - place) > near for place in self.taken)
+        is_it = is_alike(fit) and fit.correlation >= least and is_free
+        return is_it and not self._is_scene(picture, fit)
 
     def _is_scene(self, picture: Picture, fit: Fit) -> bool:
         """Whether what was found stood there before the object came.
 
         A region with some background in it can fit the scene once the object has gone.
         """
-        if np.hypot(*(fit.pose - self.first_pose)[:2]) < self.template.radius:
+        if length(fit.pose - self.first_pose) < self.template.radius:
             return False
         target = self.template.sharp(FINE_PX)
         then, now = (target.values_at(one, fit.pose) for one in (self.first_picture, picture))
@@ -327,50 +320,32 @@ class Follower:
         """How far from the expected place the object can be; any distance while it is new."""
         if len(self.poses) - self.frames_before - self.frames_missed < SETTLED_FRAMES:
             return np.inf
-        speed = float(np.hypot(*self.velocity[:2]))
-        most = max(1.5 * speed, self.template.radius, HIT_GAIN * self.fastest_px)
+        most = max(1.5 * self.speed_px, self.template.radius, HIT_GAIN * self.fastest_px)
         return most * min(self.since, MAX_LEAP_FRAMES)
 
-    def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
-        """The velocity at `pose`: the mean one since the last frame plus half its change.
+    def _velocity_to(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """The mean velocity since the last frame, that at `pose`, and whether a blow changed it.
 
-        Without the second term a steadily accelerated object seems slower than it is, and
-        the exposure longer. Where the speed changes by more than a half, it was a blow.
+        That at `pose` is the mean one plus half its change: without this a steadily accelerated
+        object seems slower than it is, and the exposure longer. Where the speed changes by more
+        than a half, it was a blow.
         """
         mean = (pose - self.pose) / self.since
         change = mean - self.mean_velocity
-        return mean if self._is_blow(pose) else mean + change / 2
+        is_blow = length(change) > 0.5 * length(mean)
+        return mean, mean if is_blow else mean + change / 2, is_blow
 
-    def _is_blow(self, pose: np.ndarray) -> bool:
-        """Whether it can be at `pose` only if its speed changed by a half, or more."""
-        mean = (pose - self.pose) / self.since
-        change = mean - self.mean_velocity
-        return bool(np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2]))
-
-    def _keep(self, picture: Picture) -> None:
-        if np.hypot(*self.velocity[:2]) * self.exposure.share > SHARP_PX:
-            return
+    def _keep(self, patch: np.ndarray) -> None:
+        """Renews the template from the sharp patches so far."""
         if not self.template.is_sharp:
             # The first sharp look of what was smeared takes the smeared one's place.
             self.patches, self.frames_sharp, self.stride = [], 0, 1
-            sharp = patch_at(picture.grey, self.pose, self.template.radius)
-            self.template = Template(sharp, self.template.region)
+            self.template = Template(patch, self.template.region)
         if self.frames_sharp % self.stride == 0:
-            self.patches.append(patch_at(picture.grey, self.pose, self.template.radius))
+            self.patches.append(patch)
             if len(self.patches) > MAX_PATCHES:
                 del self.patches[1::2]
                 self.stride *= 2
         self.frames_sharp += 1
         if self.frames_sharp in RENEWALS:
             self.template = median_template(self.patches, self.template.region)
-
-
-CHANGING = (
-    "template", "pose", "velocity", "mean_velocity", "correlation", "frames_missed",
-    "frames_held", "since", "stride", "frames_sharp", "_off_course_px",
-)  # fmt: skip
-"""What a step changes of a follower, besides its lists."""
-
-
-def _correlation(fit: Fit) -> float:
-    return fit.correlation

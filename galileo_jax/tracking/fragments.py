@@ -9,6 +9,7 @@ import numpy as np
 from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.follower import SAME_PLACE, Follower
 from galileo_jax.tracking.picture import Picture
+from galileo_jax.tracking.pose import length
 from galileo_jax.tracking.refiner import Velocities, velocities_at
 from galileo_jax.tracking.template import Outline, template_at
 
@@ -65,17 +66,14 @@ class Piece:
     def poses(self, count: int) -> np.ndarray:
         """The first pass's `[frame, 3]`; NaN outside of the piece and where not found."""
         found = np.full((count, 3), np.nan)
-        own = self.follower.poses[: count - self.first_frame]
-        if own:
-            found[self.first_frame : self.first_frame + len(own)] = own
+        for frame, pose in zip(range(self.first_frame, count), self.follower.poses, strict=False):
+            found[frame] = pose
         return found
 
     def velocities(self, poses: np.ndarray, frame: int, clock: np.ndarray) -> Velocities:
         """Around a frame; it is not known how the object came to where somebody put it right."""
-        ends = [at for at in self.corrected if at > frame]
-        begins = [at for at in self.corrected if at <= frame]
-        first = max(begins, default=0)
-        end = min(ends, default=len(poses))
+        first = max((at for at in self.corrected if at <= frame), default=0)
+        end = min((at for at in self.corrected if at > frame), default=len(poses))
         return velocities_at(poses[first:end], frame - first, clock[first:end])
 
 
@@ -86,8 +84,8 @@ def follow_on(
     before: Picture | None,
     picture: Picture,
     exposure: Exposure,
-    beside: Sequence[Follower] = (),
-    step: float = 1.0,
+    beside: Sequence[Follower],
+    step: float,
 ) -> None:
     """One frame further; `pieces` grows where a new one begins.
 
@@ -109,8 +107,8 @@ def follow_on(
             pieces[-1] = replace(last, corrected=(*last.corrected, index))
             return
         turned = last.turned_rad + float(last.follower.pose[2])
-        pieces.append(replace(_begun(told, picture, exposure), corrected=(index,)))
-        pieces[-1] = replace(pieces[-1], turned_rad=turned)
+        begun = _begun(told, picture, exposure)
+        pieces.append(replace(begun, corrected=(index,), turned_rad=turned))
     own = pieces[-1]
     own.follower.is_alone = not beside
     own.follower.fastest_px = max((one.speed_px for one in beside), default=0.0)
@@ -130,9 +128,9 @@ def keep_apart(
     """
     for one, other in combinations([piece for piece in pieces if index > piece.first_frame], 2):
         pair = [one.follower, other.follower]
-        apart = float(np.hypot(*(pair[0].poses[-1] - pair[1].poses[-1])[:2]))
         # NaN compares False: what is not found is nowhere.
-        if apart < SAME_PLACE * min(follower.size_px for follower in pair):
+        apart_px = length(pair[0].poses[-1] - pair[1].poses[-1])
+        if apart_px < SAME_PLACE * min(follower.size_px for follower in pair):
             strays, stays = sorted(pair, key=lambda each: -each.off_course_px)
             strays.again(before, picture, (stays.poses[-1],))
 

@@ -22,7 +22,7 @@ Processing Magazine 15 (1998) 74, doi:10.1109/79.733497 (motion-compensated pred
 what was measured: docs/explanation/tracking.md.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,32 +43,23 @@ along x: -0.026, -0.023, -0.033 px (60 rendered clips that were looked at)."""
 OWN_NOISE_VALUES = 5.0
 """An object's noise weighs against so many values with the noise of the whole video."""
 PIECE_FRAMES, DEGREE = 8, 2
-MIN_PIECES = 3
-"""Fewer pieces tell no amplitude."""
-ROUGH = 6.0
-"""A piece with so many times the usual mean square is left out: something was hit in it."""
+MIN_PIECES = 3  # fewer pieces tell no amplitude
+ROUGH = 6.0  # A piece with so many times the usual mean square is left out: something was hit in it
 MOST_ALIKE = 0.8
 """If displacements agree so well in where they lie between two half pixels (length of the mean
 phasor), a piece tells nothing."""
-SLOPE_MOST = 0.9
-"""Of e': beyond 1, two places of the object would give the same picture."""
+SLOPE_MOST = 0.9  # of e': beyond 1, two places of the object would give the same picture
 VARIES_PX, VARIES_SHARE = 0.005, 0.3
 """By how much an amplitude differs from what was found, now more, now less: standard deviation, but
 never more than this share of the amplitude. With it the errors of what moves in 120 rendered clips
 (241 stretches, looked at) are more probable by 54 nats; it lasts about `LASTS_FRAMES`."""
 LASTS_FRAMES = 10.0
 LEAST_VOLUME = 1e-3
-SHARE_LEFT = 1 - (DEGREE + 1) / PIECE_FRAMES
-"""Of a piece's values, what a parabola leaves."""
+SHARE_LEFT = 1 - (DEGREE + 1) / PIECE_FRAMES  # of a piece's values, what a parabola leaves
 FASTEST_PX = 32.0
 """From a frame to the next: amplitudes were -0.027 px up to 16 px, -0.02 px to 32 px and 0 beyond
 (object 1 in 60 rendered clips that were looked at); so far a coder finds no block again."""
-TURNS_RAD = 0.01
-"""From a frame to the next: a third of a pixel at the rim of a middling object."""
-
-
-def _same(place_px: np.ndarray) -> np.ndarray:
-    return place_px
+TURNS_RAD = 0.01  # from a frame to the next: a third of a pixel at the rim of a middling object
 
 
 @dataclass(frozen=True)
@@ -82,8 +73,8 @@ class Coding:
     """
 
     is_predicted: Bool[np.ndarray, " frame"]
-    to_coded: Callable[[np.ndarray], np.ndarray] = _same
-    from_coded: Callable[[np.ndarray], np.ndarray] = _same
+    to_coded: Callable[[np.ndarray], np.ndarray] = np.asarray
+    from_coded: Callable[[np.ndarray], np.ndarray] = np.asarray
 
 
 class Mended(NamedTuple):
@@ -115,30 +106,21 @@ def without_coding_shift(
     amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted, clock)
     found = []
     for (poses, _), (coded, covariance), own_px in zip(paths, shown, amplitudes_px, strict=True):
-        step = _displacement(coded)
-        sines = _patterns(step, coding.is_predicted[: len(step)])
         # What does not move is shown where it was, and noise in its steps would only add noise.
         # What turns no shifted block predicts, so that it is coded anew.
         is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
         is_coded = _moves(coded, covariance) & ~is_turning
-        sines = np.where(is_coded[..., None], sines, 0.0)
+        sines = np.where(is_coded[..., None], _sines(coded, coding.is_predicted)[0], 0.0)
         shift = np.sum(sines * own_px, axis=-1)
         is_shifted = shift.any(axis=1, keepdims=True)
         place = np.where(is_shifted, coding.from_coded(coded - shift), poses[:, :2])
-        varies_px = np.minimum(VARIES_PX, VARIES_SHARE * np.abs(own_px))
-        uncertain = _along_axes(sines * varies_px)
+        sizes = sines * np.minimum(VARIES_PX, VARIES_SHARE * np.abs(own_px))
+        # A vector for each step and axis: along x those of x, along y those of y.
+        uncertain = sizes.transpose(0, 2, 1)[..., None] * np.eye(2)
+        uncertain = uncertain.reshape(len(poses), 2 * len(STEPS_PER_PX), 2)
         away = coding.from_coded(coded[:, None] + uncertain) - coding.from_coded(coded[:, None])
         found.append(Mended(np.column_stack([place, poses[:, 2]]), away))
     return found
-
-
-def _along_axes(
-    sizes: Float[np.ndarray, "frame 2 step"],
-) -> Float[np.ndarray, "frame pattern 2"]:
-    """A vector for each axis and step: along x those of x, along y those of y."""
-    frames, axes, steps = sizes.shape
-    along = sizes.transpose(0, 2, 1)[..., None] * np.eye(axes)
-    return along.reshape(frames, steps * axes, axes)
 
 
 def coding_shift_amplitudes_px(
@@ -157,22 +139,21 @@ def coding_shift_amplitudes_px(
     """
     found = np.zeros((len(paths), 2, len(STEPS_PER_PX)))
     pieces = [
-        (index, axis, piece)
+        (piece, (index, axis))
         for index, (place, covariance) in enumerate(paths)
         for axis in range(2)
         for piece in _smooth_pieces(place, covariance, is_predicted, clock, axis)
     ]
     if len(pieces) < MIN_PIECES:
         return found
-    size = np.array([np.mean(piece.left**2) for _, _, piece in pieces])
-    is_smooth = size < ROUGH * np.median(size)
-    pieces = [each for each, smooth in zip(pieces, is_smooth, strict=True) if smooth]
-    whole = _joined([piece for _, _, piece in pieces])
+    size = np.array([np.mean(piece.left**2) for piece, _ in pieces])
+    pieces = [pieces[i] for i in np.flatnonzero(size < ROUGH * np.median(size))]
+    whole = _together([piece for piece, _ in pieces])
     found[:] = usual = _likeliest(whole, np.zeros(len(STEPS_PER_PX)), USUAL_PX, 0.0)
     noise2 = float(np.sum(whole.errors(usual) ** 2)) / whole.degrees
-    for index, axis in sorted({(index, axis) for index, axis, _ in pieces}):
-        own = _joined([piece for i, a, piece in pieces if (i, a) == (index, axis)])
-        found[index, axis] = _likeliest(own, usual, OWN_PX, noise2)
+    for whose in sorted({whose for _, whose in pieces}):
+        own = _together([piece for piece, each in pieces if each == whose])
+        found[whose] = _likeliest(own, usual, OWN_PX, noise2)
     return found
 
 
@@ -199,27 +180,30 @@ class _Smooth(NamedTuple):
         return self.left - self.pattern @ amplitudes_px
 
 
+def _together(pieces: Sequence[_Smooth]) -> _Smooth:
+    return _Smooth(*(np.stack(each) for each in zip(*pieces, strict=True)))
+
+
 def _smooth_pieces(
     place: Float[np.ndarray, "frame 2"],
     covariance: Float[np.ndarray, "frame 2 2"],
     is_predicted: Bool[np.ndarray, " frame"],
     clock: Float[np.ndarray, " frame"],
     axis: int,
-) -> list[_Smooth]:
+) -> Iterator[_Smooth]:
     """Pieces of an object's motion along an axis, one after the other, that tell amplitudes."""
-    step = _displacement(place)
-    pattern = _patterns(step, is_predicted[: len(step)])[:, axis]
-    slope = _slopes(step, is_predicted[: len(step)])[:, axis]
-    return [
-        _Smooth(off_path @ place[own, axis], off_path @ pattern[own], slope[own])
-        for own in _pieces(_moves(place, covariance)[:, axis])
-        if _alike(step[own, axis]) < MOST_ALIKE
-        for off_path in [_off_parabola(clock[own])]
-    ]
-
-
-def _joined(pieces: Sequence[_Smooth]) -> _Smooth:
-    return _Smooth(*(np.stack(each) for each in zip(*pieces, strict=True)))
+    pattern, slope = (each[:, axis] for each in _sines(place, is_predicted))
+    step = np.diff(place[:, axis], prepend=np.nan)
+    for run in stretches(_moves(place, covariance)[:, axis]):
+        for first in range(run.start, run.stop - PIECE_FRAMES + 1, PIECE_FRAMES):
+            own = slice(first, first + PIECE_FRAMES)
+            if np.abs(np.mean(np.exp(2j * np.pi * STEPS_PER_PX[0] * step[own]))) >= MOST_ALIKE:
+                continue
+            # Projects a piece onto what no parabola describes.
+            since = 2 * (clock[own] - clock[first]) / (clock[own][-1] - clock[first]) - 1
+            basis, _ = np.linalg.qr(np.vander(since, DEGREE + 1))
+            off_path = np.eye(PIECE_FRAMES) - basis @ basis.T
+            yield _Smooth(off_path @ place[own, axis], off_path @ pattern[own], slope[own])
 
 
 def _likeliest(
@@ -253,65 +237,30 @@ def _likeliest(
 
     most = SLOPE_MOST / (2 * np.pi * STEPS_PER_PX)
     bounds = list(zip(-most, most, strict=True))
-    starts = (usual_px, usual_px - sd_px / STEPS_PER_PX)
     ends = [
-        minimize(cost, np.clip(start, -most, most), jac=True, bounds=bounds) for start in starts
+        minimize(cost, np.clip(start, -most, most), jac=True, bounds=bounds)
+        for start in (usual_px, usual_px - sd_px / STEPS_PER_PX)
     ]
     return np.asarray(min(ends, key=lambda end: float(end.fun)).x)
 
 
-def _displacement(place: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2"]:
-    """From the frame before; NaN where either is not visible."""
-    return np.diff(place, axis=0, prepend=np.nan)
+def _sines(
+    place: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
+) -> tuple[Float[np.ndarray, "frame 2 step"], Float[np.ndarray, "frame 2 step"]]:
+    """The sines of the displacement, and their derivatives by it, 1/px.
 
-
-def _patterns(
-    step: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
-) -> Float[np.ndarray, "frame 2 step"]:
-    """The sines; 0 where nothing is known of the frame before, or the object is too fast."""
-    phase = 2 * np.pi * STEPS_PER_PX * np.nan_to_num(step)[..., None]
-    return np.where(_is_found_again(step, is_predicted)[:, None, None], np.sin(phase), 0.0)
-
-
-def _slopes(
-    step: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
-) -> Float[np.ndarray, "frame 2 step"]:
-    """The sines' derivatives by the displacement, 1/px."""
-    rate = 2 * np.pi * STEPS_PER_PX
-    slope = rate * np.cos(rate * np.nan_to_num(step)[..., None])
-    return np.where(_is_found_again(step, is_predicted)[:, None, None], slope, 0.0)
-
-
-def _is_found_again(
-    step: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
-) -> Bool[np.ndarray, " frame"]:
-    """Whether a coder has predicted the object from the frame before."""
-    return is_predicted & (np.hypot(*step.T) < FASTEST_PX)  # not of NaN
+    0 where a coder has not predicted the object from the frame before: where that is coded whole,
+    it is not visible, or too fast.
+    """
+    step, rate = np.diff(place, axis=0, prepend=np.nan), 2 * np.pi * STEPS_PER_PX
+    is_found = is_predicted[: len(step)] & (np.hypot(*step.T) < FASTEST_PX)  # not of NaN
+    phase = rate * np.where(is_found[:, None], step, 0.0)[..., None]
+    return np.sin(phase), np.where(is_found[:, None, None], rate * np.cos(phase), 0.0)
 
 
 def _moves(
     place: Float[np.ndarray, "frame 2"], covariance: Float[np.ndarray, "frame 2 2"]
 ) -> Bool[np.ndarray, "frame 2"]:
     """Whether the step into a frame is beyond noise."""
-    steps = has_moved(place, np.einsum("fii->fi", covariance))
+    steps = has_moved(place, covariance)
     return np.pad(steps, ((len(place) - len(steps), 0), (0, 0)))
-
-
-def _pieces(moves: Bool[np.ndarray, " frame"]) -> list[slice]:
-    """Of each unbroken motion all that fit into it, one after the other."""
-    return [
-        slice(first, first + PIECE_FRAMES)
-        for run in stretches(moves)
-        for first in range(run.start, run.stop - PIECE_FRAMES + 1, PIECE_FRAMES)
-    ]
-
-
-def _alike(step: Float[np.ndarray, " frame"]) -> float:
-    return float(np.abs(np.mean(np.exp(2j * np.pi * STEPS_PER_PX[0] * step))))
-
-
-def _off_parabola(clock: Float[np.ndarray, " frame"]) -> Float[np.ndarray, "frame frame"]:
-    """Projects a piece onto what no parabola describes."""
-    since = 2 * (clock - clock[0]) / (clock[-1] - clock[0]) - 1
-    basis, _ = np.linalg.qr(np.vander(since, DEGREE + 1))
-    return np.eye(PIECE_FRAMES) - basis @ basis.T

@@ -4,14 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-MOVED_SDS = 4.0
-"""A step of more standard deviations than these is a motion, not noise."""
-MIN_WINDOWS = 8
-"""Fewer third differences do not tell a variance."""
-THIRD_FRAMES = 4
-"""Frames of a third difference."""
-CHI2_MEDIAN = 0.4549
-"""Median of chi^2 with one degree of freedom."""
+MOVED_SDS = 4.0  # A step of more standard deviations than these is a motion, not noise
+MIN_WINDOWS = 8  # fewer third differences do not tell a variance
+THIRD_FRAMES = 4  # frames of a third difference
+CHI2_MEDIAN = 0.4549  # median of chi^2 with one degree of freedom
 CUT_SDS, CUT_VARIANCE = 3.0, 0.9733
 """Differences beyond are blows; the variance that a normal keeps when it is cut there."""
 SAMPLING_SD_PX = 0.002
@@ -57,13 +53,14 @@ BLOW_KNOWN_TO = 0.5
 share of the exposure is known to some 15 %."""
 
 
-def has_moved(place: np.ndarray, variance: np.ndarray) -> np.ndarray:
+def has_moved(place: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Whether each step, `[frame - 1, ...]`, is beyond noise; a step from or to NaN is not.
 
     Args:
       place: `[frame, ...]`, px.
-      variance: the same shape, px^2, of image noise.
+      noise: its variance, the same shape, px^2; or the covariance of each of `[frame, 2]`.
     """
+    variance = noise if noise.ndim == place.ndim else np.einsum("fii->fi", noise)
     return np.diff(place, axis=0) ** 2 > MOVED_SDS**2 * (variance[1:] + variance[:-1])
 
 
@@ -77,21 +74,18 @@ def is_in_motion(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
       place: `[frame, 2]`, px, finite.
       covariance: `[frame, 2, 2]`, px^2, image noise.
     """
-    moved = has_moved(place, np.einsum("fii->fi", covariance))
-    into, out_of = np.pad(moved, ((1, 0), (0, 0))), np.pad(moved, ((0, 1), (0, 0)))
-    before = np.pad(into, ((SETTLES_FRAMES, 0), (0, 0)))
-    lately = np.lib.stride_tricks.sliding_window_view(before, SETTLES_FRAMES + 1, axis=0)
-    return out_of | lately.any(axis=-1)
+    moved = has_moved(place, covariance)
+    out_of = np.pad(moved, ((0, 1), (0, 0)))
+    before = np.pad(moved, ((SETTLES_FRAMES + 1, 0), (0, 0)))
+    return out_of | _windows(before, SETTLES_FRAMES + 1).any(axis=-1)
 
 
 def after_blow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """`[frame, 2]`: how many times the variance of motion an axis has where a blow begins it.
 
-    Args:
-      place: `[frame, 2]`, px, finite.
-      covariance: `[frame, 2, 2]`, px^2, image noise.
+    Arguments as those of `is_in_motion`.
     """
-    moved = has_moved(place, np.einsum("fii->fi", covariance))
+    moved = has_moved(place, covariance)
     # Into the frame that a step leaves; what moves in its first frame may have moved before.
     stood = ~np.pad(moved, ((1, 0), (0, 0)), constant_values=True)[:-1]
     step = np.pad(np.abs(np.diff(place, axis=0)), ((0, 2), (0, 0)))
@@ -108,13 +102,9 @@ def slow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """`[frame, 2]`: how many times the variance of motion an axis has along which hardly any is.
 
     What has come to rest is not in motion: from the second frame after its last step on it has the
-    usual variance.
-
-    Args:
-      place: `[frame, 2]`, px, finite.
-      covariance: `[frame, 2, 2]`, px^2, image noise.
+    usual variance. Arguments as those of `is_in_motion`.
     """
-    moved = np.pad(has_moved(place, np.einsum("fii->fi", covariance)), ((2, 0), (0, 0)))
+    moved = np.pad(has_moved(place, covariance), ((2, 0), (0, 0)))
     step = np.abs(np.diff(place, axis=0, prepend=place[:1]))
     return np.where((step < SLOW_PX) & (moved[1:] | moved[:-1]), SLOW_SCALE2, 1.0)
 
@@ -200,14 +190,13 @@ def _third_differences(
     """
     if len(place) < THIRD_FRAMES:
         return np.empty((3, 0))
-    windows = np.lib.stride_tricks.sliding_window_view
-    moves = windows(has_moved(place, variance), THIRD_FRAMES - 1).all(axis=1)
-    at = windows(clock, THIRD_FRAMES)
+    moves = _windows(has_moved(place, variance), THIRD_FRAMES - 1).all(axis=1)
+    at = _windows(clock, THIRD_FRAMES)
     apart = at[:, :, None] - at[:, None, :] + np.eye(THIRD_FRAMES)
     share = 6 / apart.prod(axis=2)
-    both = np.stack([variance, np.zeros_like(variance) if excess is None else excess])
-    expected = np.sum(windows(both, THIRD_FRAMES, axis=1) * share**2, axis=-1)
-    third = np.sum(windows(place, THIRD_FRAMES) * share, axis=-1)
+    third = np.sum(_windows(place, THIRD_FRAMES) * share, axis=-1)
+    both = (variance, np.zeros_like(variance) if excess is None else excess)
+    expected = [np.sum(_windows(each, THIRD_FRAMES) * share**2, axis=-1) for each in both]
     return np.stack([third**2, *expected])[:, moves]
 
 
@@ -249,17 +238,20 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     blow = np.pad(sudden(jumps), ((1, 1), (0, 0)))
     own = np.linalg.norm(blow[1:-1], axis=1)
     direction = blow[1:-1] / np.maximum(own, 1e-12)[:, None]
-    sides = [(beside * direction).sum(axis=1) for beside in (blow[:-2], blow[2:])]
-    beside = np.maximum(np.maximum(*sides), 0)
+    before, after = ((side * direction).sum(axis=1) for side in (blow[:-2], blow[2:]))
+    beside = np.maximum(np.maximum(before, after), 0)
     whole = own + beside
     instant = beside / np.maximum(whole, 1e-12)
     open_after = np.maximum(exposure_share / 2 - instant, 0)
-    shift = whole * open_after**2 / (2 * exposure_share)
-    return shift[:, None] * direction
+    return (whole * open_after**2 / (2 * exposure_share))[:, None] * direction
 
 
 def sudden(jumps: np.ndarray) -> np.ndarray:
     """`[frame, 2]`: what changes of the velocity exceed the steady acceleration around them by."""
     padded = np.pad(jumps, ((STEADY_FRAMES // 2,) * 2, (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, STEADY_FRAMES, axis=0)
-    return jumps - np.median(windows, axis=-1)
+    return jumps - np.median(_windows(padded, STEADY_FRAMES), axis=-1)
+
+
+def _windows(values: np.ndarray, frames: int) -> np.ndarray:
+    """So many frames in a row, as the last axis."""
+    return np.lib.stride_tricks.sliding_window_view(values, frames, axis=0)

@@ -9,16 +9,14 @@ import numpy as np
 
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.track import Track
 
-COLOURS = ((40, 40, 255), (255, 160, 0), (0, 200, 0), (220, 0, 220))
-"""BGR, by object."""
+COLOURS = ((40, 40, 255), (255, 160, 0), (0, 200, 0), (220, 0, 220))  # BGR, by object
 OUTLINE = (255, 255, 255)
-SUBPIXEL_BITS = 4
-"""OpenCV draws at multiples of 1/16 px."""
+SUBPIXEL_BITS = 4  # OpenCV draws at multiples of 1/16 px
 MARK_PX = 9.0
-SMALLEST_PX = 960
-"""Smaller pictures are enlarged to about this width, so that a pixel can be seen."""
+SMALLEST_PX = 960  # smaller pictures are enlarged to about this width, so that a pixel can be seen
 
 
 def write_overlay_video(
@@ -69,9 +67,7 @@ def drawn(frame: np.ndarray, track: Track, index: int, scale: int) -> np.ndarray
             if b == a + 1:  # no line across a gap
                 _line(picture, places[a], places[b], colour)
         last = seen[-1]
-        angle = track.angle_rad[k, last]
-        arms = MARK_PX * np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        for arm in arms:
+        for arm in MARK_PX * rotation(track.angle_rad[k, last]).T:
             _line(picture, places[last] - arm, places[last] + arm, OUTLINE)
         label = name if last == index else f"{name} (not seen)"
         corner = tuple(int(v) for v in places[last] + (12, -12))

@@ -3,14 +3,12 @@
 import cv2
 import numpy as np
 
-from galileo_jax.tracking.pose import SHARP_PX, smeared_along
+from galileo_jax.tracking.pose import SHARP_PX, smeared_along, square_around
 
-MARGIN_PX = 6
-"""How far an object may move in an alignment before more of the frame is smoothed."""
+MARGIN_PX = 6  # how far an object may move in an alignment before more of the frame is smoothed
 PART_MARGIN_PX = 24
 """A part that is kept for later holds so much more: room for the alignment and the smoothing."""
-UPSAMPLED_TO_PX = 2.0
-"""What is smoothed less than this is kept at twice the frame's resolution."""
+UPSAMPLED_TO_PX = 2.0  # what is smoothed less than this is kept at twice the frame's resolution
 PYRAMID_VARIANCE_PX2 = 0.25
 """OpenCV's `pyrUp` smooths by the binomial (1 4 6 4 1) / 16 of half pixels, while it doubles."""
 LINEAR_SHARE = 1 / 6
@@ -49,7 +47,8 @@ class Picture:
 
     def part(self, pose: np.ndarray, reach_px: float) -> "Picture":
         """A copy of what is within `reach_px` of the pose's point, and of what smoothing needs."""
-        cut, (left, top) = _cut(self.grey, pose[:2] - self._corner_px, reach_px + PART_MARGIN_PX)
+        reach = int(np.ceil(reach_px)) + PART_MARGIN_PX + 1
+        cut, (left, top) = square_around(self.grey, pose[:2] - self._corner_px, reach)
         x, y = self._corner_px
         return Picture(cut.copy(), (left + x, top + y), self.size_px)
 
@@ -97,24 +96,13 @@ class Picture:
         return window.at(place, pose[2], own)
 
 
-def _cut(
-    grey: np.ndarray, place: np.ndarray, reach_px: float
-) -> tuple[np.ndarray, tuple[int, int]]:
-    """The square around a place, within the picture, and its corner; never empty."""
-    span = int(np.ceil(reach_px)) + 1
-    height, width = grey.shape
-    x, y = (int(c) for c in np.floor(place))
-    left, top = min(max(x - span, 0), width - 1), min(max(y - span, 0), height - 1)
-    right, bottom = max(min(x + span + 2, width), left + 1), max(min(y + span + 2, height), top + 1)
-    return grey[top:bottom, left:right], (left, top)
-
-
 class _Window:
     """What lies around a place, smoothed."""
 
     def __init__(self, grey: np.ndarray, place: np.ndarray, reach_px: float, width_px: float):
         self._middle, self._reach_px = place, reach_px
-        cut, self._corner = _cut(grey, place, reach_px + MARGIN_PX + 3 * width_px)
+        reach = int(np.ceil(reach_px + MARGIN_PX + 3 * width_px)) + 1
+        cut, self._corner = square_around(grey, place, reach)
         pixels, self._scale, variance = cut.astype(np.float32), 1, width_px**2
         if width_px < UPSAMPLED_TO_PX:
             pixels, self._scale = cv2.pyrUp(pixels), 2

@@ -8,8 +8,12 @@ the image seen in the object's own axes: its centre pixel is the followed point.
 import cv2
 import numpy as np
 
-SHARP_PX = 0.1
-"""A motion during the exposure that is shorter leaves the picture as it is."""
+SHARP_PX = 0.1  # A motion during the exposure that is shorter leaves the picture as it is
+
+
+def length(motion: np.ndarray) -> float:
+    """Of the shift in a motion `(dx, dy, ...)`, px."""
+    return float(np.hypot(motion[0], motion[1]))
 
 
 def rotation(angle_rad: float) -> np.ndarray:
@@ -23,6 +27,11 @@ def compose(pose: np.ndarray, motion: np.ndarray) -> np.ndarray:
     return np.array([*(pose[:2] + rotation(pose[2]) @ motion[:2]), pose[2] + motion[2]])
 
 
+def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
+    """A pose's change per frame `(dx, dy, dangle)`, its shift turned into the object's axes."""
+    return np.array([*(rotation(angle_rad).T @ velocity[:2]), velocity[2]])
+
+
 def patch_at(image: np.ndarray, pose: np.ndarray, radius: int) -> np.ndarray:
     """The float32 patch `[2 radius + 1, 2 radius + 1]` of a grey `image` at `pose` (Lanczos).
 
@@ -33,60 +42,60 @@ def patch_at(image: np.ndarray, pose: np.ndarray, radius: int) -> np.ndarray:
     turn = rotation(pose[2])
     shift = pose[:2] - turn @ (radius, radius)
     # Only the square around the object is converted and sampled: time per object, not per frame.
-    reach = int(np.ceil(radius * 1.5)) + 3
-    x0, y0 = (int(np.floor(c)) - reach for c in pose[:2])
-    x1, y1 = x0 + 2 * reach + 1, y0 + 2 * reach + 1
-    height, width = image.shape[:2]
-    left, top = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
-    crop = image[top : max(min(y1, height), top + 1), left : max(min(x1, width), left + 1)]
+    crop, corner = square_around(image, pose[:2], int(np.ceil(radius * 1.5)) + 3)
     return cv2.warpAffine(
         crop.astype(np.float32),
-        np.column_stack([turn, shift - (left, top)]),
+        np.column_stack([turn, shift - corner]),
         (2 * radius + 1, 2 * radius + 1),
         flags=cv2.INTER_LANCZOS4 | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     )
 
 
-def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def square_around(
+    image: np.ndarray, place: np.ndarray, reach: int
+) -> tuple[np.ndarray, tuple[int, int]]:
+    """What of an image is within `reach` pixels of a place, never empty, and its corner (x, y)."""
+    height, width = image.shape
+    x, y = (int(c) for c in np.floor(place))
+    left, top = min(max(x - reach, 0), width - 1), min(max(y - reach, 0), height - 1)
+    right, bottom = min(x + reach + 2, width), min(y + reach + 2, height)
+    return image[top : max(bottom, top + 1), left : max(right, left + 1)], (left, top)
+
+
+def moved(patch: np.ndarray, motion: np.ndarray, border: int = cv2.BORDER_REPLICATE) -> np.ndarray:
+    """A patch that is turned about its middle and shifted, `(dx, dy, dangle)`."""
+    turn, middle = rotation(motion[2]), np.full(2, (patch.shape[0] - 1) / 2)
+    matrix = np.column_stack([turn, middle + motion[:2] - turn @ middle])
+    return cv2.warpAffine(patch, matrix, patch.shape[::-1], borderMode=border)
+
+
+def smear(patch: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """A patch as seen while the object moves by `motion` (own axes) during the exposure.
 
     The mean of the patch over the poses from `-motion / 2` to `+motion / 2`: the blur of a
     constant velocity and turn, centred on the pose itself.
     """
-    radius = (image.shape[0] - 1) / 2
-    turning = abs(motion[2]) * radius / 2
-    length = np.hypot(*motion[:2]) + turning
-    if length < SHARP_PX:
-        return image
+    turning = abs(motion[2]) * (patch.shape[0] - 1) / 4
+    if length(motion) + turning < SHARP_PX:
+        return patch
     if turning < SHARP_PX:
-        return smeared_along(image, motion[:2])
-    samples = int(np.ceil(length)) + 1
-    shares = (np.arange(samples) + 0.5) / samples - 0.5
-    total = np.zeros_like(image)
-    centre = np.array([radius, radius])
-    for share in shares:
-        turn = rotation(share * motion[2])
-        shift = centre + share * motion[:2] - turn @ centre
-        total += cv2.warpAffine(
-            image,
-            np.column_stack([turn, shift]),
-            image.shape[::-1],
-            flags=cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-    return total / samples
+        return smeared_along(patch, motion[:2])
+    return np.mean([moved(patch, share * motion) for share in _shares(length(motion) + turning)], 0)
 
 
 def smeared_along(image: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """A picture that is smeared evenly along `shift` (x, y), px, centred; as `smear`."""
-    length = float(np.hypot(*shift))
-    if length < SHARP_PX:
+    if length(shift) < SHARP_PX:
         return image
-    samples = int(np.ceil(length)) + 1
-    shares = (np.arange(samples) + 0.5) / samples - 0.5
-    kernel = _kernel(shares[:, None] * shift)
+    kernel = _kernel(_shares(length(shift))[:, None] * shift)
     return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE)
+
+
+def _shares(length_px: float) -> np.ndarray:
+    """Instants of an exposure, -1/2 to 1/2, between which less than a pixel is gone."""
+    samples = int(np.ceil(length_px)) + 1
+    return (np.arange(samples) + 0.5) / samples - 0.5
 
 
 def _kernel(shifts: np.ndarray) -> np.ndarray:
@@ -98,10 +107,7 @@ def _kernel(shifts: np.ndarray) -> np.ndarray:
     x, y = (shifts - low).T
     column, row = (low + reach + 1).T
     for i, j, part in (
-        (0, 0, (1 - x) * (1 - y)),
-        (1, 0, x * (1 - y)),
-        (0, 1, (1 - x) * y),
-        (1, 1, x * y),
-    ):
+        (0, 0, (1 - x) * (1 - y)), (1, 0, x * (1 - y)), (0, 1, (1 - x) * y), (1, 1, x * y),
+    ):  # fmt: skip
         np.add.at(kernel, (row + j, column + i), part)
     return kernel / len(shifts)

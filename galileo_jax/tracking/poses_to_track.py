@@ -22,7 +22,7 @@ from galileo_jax.tracking.noise import (
     slow_scale2,
     speed_scale2,
 )
-from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.pose import length, rotation
 from galileo_jax.tracking.refiner import Refined
 
 MIN_CORRELATION = 0.7
@@ -30,10 +30,8 @@ MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
 """An object is visible if its patch correlates with the template, no more of it than these
 shares differs from the template by more than noise, or lies beyond the picture's border."""
 
-LONG_RUN = 10
-"""A run of so many frames is believed after any gap."""
-SAME_PLACE_PX = 1.0
-"""What comes back this close to where it was last seen had only been covered."""
+LONG_RUN = 10  # A run of so many frames is believed after any gap
+SAME_PLACE_PX = 1.0  # what comes back this close to where it was last seen had only been covered
 
 
 LONG_GAP, PATH_FRAMES = 4.0, 8
@@ -92,17 +90,14 @@ def finished(
 
 def joined(pieces: Sequence[Finished], count: int) -> Finished:
     """One object's pieces, which follow each other, as one track of so many frames."""
-    whole = Finished(
-        np.full((count, 2), np.nan),
-        np.full((count, 2, 2), np.nan),
-        np.full((count, 2, 2), np.nan),
-        np.full((count, *pieces[0].shifts_px.shape[1:]), np.nan),
-        np.full(count, np.nan),
-    )
+    whole = Finished(**{
+        name: np.full((count, *values.shape[1:]), np.nan)
+        for name, values in vars(pieces[0]).items()
+    })  # fmt: skip
     for piece in pieces:
         is_seen = np.isfinite(piece.angle_rad)
-        for into, part in zip(vars(whole).values(), vars(piece).values(), strict=True):
-            into[is_seen] = part[is_seen]
+        for name, values in vars(piece).items():
+            getattr(whole, name)[is_seen] = values[is_seen]
     if len(pieces) > 1:
         whole.common_px2[:] *= 0.0  # each piece has its own
     return whole
@@ -119,9 +114,8 @@ def _seen(
             poses[index], noise[index] = fit.pose, fit.covariance
     is_doubtful = ~_without_glimpses(poses, corrected)
     if clock is not None:
-        is_doubtful[_led_to(np.where(is_doubtful[:, None], np.nan, poses), corrected, clock) :] = (
-            True
-        )
+        believed = np.where(is_doubtful[:, None], np.nan, poses)
+        is_doubtful[_led_to(believed, corrected, clock) :] = True
     poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
     return poses, noise
 
@@ -159,12 +153,11 @@ def _anchored(
     """
     covariance = noise.copy()
     frames = np.flatnonzero(np.isfinite(poses[:, 0]))
-    moves = is_in_motion(poses[frames, :2], noise[frames])
-    grown = moves * excess * speed_scale2(poses[frames, :2])[:, None]
-    covariance[frames] += np.einsum("fi,ij->fij", grown, np.eye(2))
+    known = poses[frames, :2], noise[frames]
+    moves = is_in_motion(*known)
+    covariance[frames] += (moves * excess * speed_scale2(known[0])[:, None])[..., None] * np.eye(2)
     scale2 = motion_scale2(poses[:, :2], covariance, clock)
-    scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
-    scale2 = scale2 * slow_scale2(poses[frames, :2], noise[frames])
+    scale2 = scale2 * after_blow_scale2(*known) * slow_scale2(*known)
     scale = np.sqrt(np.where(moves, scale2, 1.0))
     covariance[frames] *= scale[:, :, None] * scale[:, None, :]
 
@@ -198,18 +191,16 @@ def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray
     What comes back for a few frames after a longer absence is more likely something like it,
     unless it is where it was, or somebody has seen it there.
     """
-    is_seen = np.isfinite(poses[:, 0])
-    result = np.zeros_like(is_seen)
-    last_end: int | None = None
-    for run in stretches(is_seen):
-        begin, end = run.start, run.stop
-        is_same = last_end is not None and (
-            np.hypot(*(poses[begin] - poses[last_end - 1])[:2]) < SAME_PLACE_PX
+    result, last_end = np.zeros(len(poses), bool), 0
+    for run in stretches(np.isfinite(poses[:, 0])):
+        count, gap = run.stop - run.start, run.start - last_end
+        is_first, is_corrected = (
+            not last_end,
+            any(frame in range(len(poses))[run] for frame in corrected),
         )
-        is_known = is_same or any(begin <= frame < end for frame in corrected)
-        if last_end is None or is_known or end - begin >= min(begin - last_end, LONG_RUN):
-            result[begin:end] = True
-            last_end = end
+        is_same = length(poses[run.start] - poses[last_end - 1]) < SAME_PLACE_PX
+        if is_first or is_same or is_corrected or count >= min(gap, LONG_RUN):
+            result[run], last_end = True, run.stop
     return result
 
 
@@ -226,12 +217,9 @@ def _led_to(poses: np.ndarray, corrected: Sequence[int], clock: np.ndarray) -> i
         if gap < LONG_GAP or len(own) < PATH_FRAMES // 2 or any(at > last for at in corrected):
             continue
         since = clock[own] - clock[back]
-        ends, speeds = zip(
-            *(np.polyfit(since, poses[own, :2], degree)[[-1, -2]] for degree in (1, 2)),
-            strict=True,
-        )
-        way = gap * float(np.hypot(*speeds[0]))
-        off = min(float(np.hypot(*(poses[back, :2] - end))) for end in ends)
+        line, parabola = (np.polyfit(since, poses[own, :2], degree) for degree in (1, 2))
+        way = gap * length(line[0])
+        off = min(length(poses[back, :2] - end) for end in (line[-1], parabola[-1]))
         if way > LEAST_WAY_PX and off > OFF_WAY * way:
             return int(back)
     return len(poses)

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from galileo_jax.tracking.alignment import COARSE_PX, FINE_PX, Fit, Target, align
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import COARSE_PX, FINE_PX, Fit, Target, align
+from galileo_jax.tracking.pose import moved, own_motion, rotation
 from galileo_jax.tracking.template import Template
 
-SURE = 0.85
-"""A fit that correlates better than this ends the search for others."""
-CONTRAST = (0.4, 2.5)
-"""What shows the template paler or stronger than this is something else."""
+SURE = 0.85  # A fit that correlates better than this ends the search for others
+CONTRAST = (0.4, 2.5)  # what shows the template paler or stronger than this is something else
 TURNS_RAD = (0.0, 0.17, -0.17, 0.35, -0.35)
 """Turns tried in a wide search: the alignment reaches 5 degrees to each side of them."""
 MAX_PEAKS = 4
@@ -52,20 +50,14 @@ def best_fit(picture: Picture, template: Template, guesses: list[Guess]) -> Fit:
     sure one. Fits whose contrast is not the template's count only if there is no other.
     """
     best = align(*guesses[0].pair(picture, template, FINE_PX), guesses[0].pose)
-    if _is_sure(best):
-        return best
     for guess in guesses:
+        if is_alike(best) and best.correlation > SURE:
+            break
         rough = guess.pair(picture, template, COARSE_PX)
         coarse = align(*rough, guess.pose, steps=6, robust=False)
         fit = align(*guess.pair(picture, template, FINE_PX), coarse.pose)
-        best = max(best, fit, key=_rank)
-        if _is_sure(best):
-            break
+        best = max(best, fit, key=lambda one: (is_alike(one), one.correlation))
     return best
-
-
-def _is_sure(fit: Fit) -> bool:
-    return is_alike(fit) and fit.correlation > SURE
 
 
 def is_alike(fit: Fit) -> bool:
@@ -73,32 +65,21 @@ def is_alike(fit: Fit) -> bool:
     return CONTRAST[0] <= fit.gain <= CONTRAST[1]
 
 
-def _rank(fit: Fit) -> tuple[bool, float]:
-    return is_alike(fit), fit.correlation
-
-
 def candidate_poses(
     image: np.ndarray, template: Template, pose: np.ndarray, reach_px: float
 ) -> list[np.ndarray]:
     """Poses within `reach_px` of `pose` where the template, turned several ways, correlates."""
     rim = template.radius
-    size = 2 * rim + 1
     last = np.array(image.shape[::-1]) - 1
     left, top = np.clip(pose[:2] - reach_px, 0, last).astype(int)
     right, bottom = np.clip(pose[:2] + reach_px, 0, last).astype(int)
     padded = cv2.copyMakeBorder(image, rim, rim, rim, rim, cv2.BORDER_REPLICATE)
-    window = padded[top : bottom + size, left : right + size]
+    window = padded[top : bottom + 2 * rim + 1, left : right + 2 * rim + 1]
     window = cv2.GaussianBlur(window, (0, 0), 1.0).astype(np.float32)
-    centre = np.array([rim, rim])
     found: list[tuple[float, np.ndarray]] = []
     for turn in TURNS_RAD if template.shows_turns else (0.0,):
         angle = pose[2] + turn
-        matrix = rotation(angle)
-        warp = np.column_stack([matrix, centre - matrix @ centre])
-        turned = cv2.warpAffine(template.image, warp, (size, size), borderMode=cv2.BORDER_REPLICATE)
-        mask = cv2.warpAffine(template.region.astype(np.float32), warp, (size, size))
-        score = cv2.matchTemplate(window, turned, cv2.TM_CCOEFF_NORMED, mask=mask)
-        score[~np.isfinite(score)] = -1
+        score = _score(window, template.image, template.region, angle)
         for _ in range(MAX_PEAKS):
             _, peak, _, (x, y) = cv2.minMaxLoc(score)
             found.append((peak, np.array([left + x, top + y, angle])))
@@ -136,36 +117,37 @@ def after_blow(
       most_px: no blow makes it faster, per frame.
     """
     found: list[tuple[float, Guess]] = []
-    rim = template.radius
-    side, centre = 2 * rim + 1, np.array([rim, rim])
-    angles = [pose[2] + frames * velocity[2] + turn for turn in TURNS_RAD]
-    each = itertools.product(angles if template.shows_turns else angles[:1], shares)
-    for angle, share in each:
-        matrix = rotation(angle)
+    turns = TURNS_RAD if template.shows_turns else TURNS_RAD[:1]
+    for turn, share in itertools.product(turns, shares):
+        angle = pose[2] + frames * velocity[2] + turn
         through = None if template.is_sharp else share * template.moved
-        shown = picture if through is None else picture.smeared(matrix @ through[:2])
-        for speed in most_px * np.arange(1, SPEEDS + 1) / SPEEDS:
-            for direction in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-                after = speed * np.array([np.cos(direction), np.sin(direction)])
-                ends = [pose[:2] + f * velocity[:2] + (frames - f) * after for f in (0, 1)]
-                beside = frames * max(np.pi * speed / DIRECTIONS, most_px / SPEEDS / 2)
-                reach = beside + BLOW_MARGIN_PX
-                low = np.floor(np.minimum(*ends) - reach).astype(int)
-                high = np.ceil(np.maximum(*ends) + reach).astype(int)
-                window = shown.window(low - rim, high + rim)
-                if window is None:
-                    continue
-                motion = share * np.array([*(matrix.T @ after), velocity[2]])
-                target = template.target(motion, FINE_PX, through)
-                warp = np.column_stack([matrix, centre - matrix @ centre])
-                turned = cv2.warpAffine(
-                    target.image, warp, (side, side), borderMode=cv2.BORDER_REPLICATE
-                )
-                mask = cv2.warpAffine(target.region.astype(np.float32), warp, (side, side))
-                score = cv2.matchTemplate(window, turned, cv2.TM_CCOEFF_NORMED, mask=mask)
-                score[~np.isfinite(score)] = -1
-                _, peak, _, (x, y) = cv2.minMaxLoc(score)
-                there = np.array([low[0] + x, low[1] + y, angle])
-                found.append((peak, Guess(there, motion, through)))
+        shown = picture if through is None else picture.smeared(rotation(angle) @ through[:2])
+        speeds = most_px * np.arange(1, SPEEDS + 1) / SPEEDS
+        directions = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        for speed, direction in itertools.product(speeds, directions):
+            after = speed * np.array([np.cos(direction), np.sin(direction)])
+            ends = [pose[:2] + f * velocity[:2] + (frames - f) * after for f in (0, 1)]
+            beside = frames * max(np.pi * speed / DIRECTIONS, most_px / SPEEDS / 2)
+            reach = beside + BLOW_MARGIN_PX
+            low = np.floor(np.minimum(*ends) - reach).astype(int)
+            high = np.ceil(np.maximum(*ends) + reach).astype(int)
+            window = shown.window(low - template.radius, high + template.radius)
+            if window is None:
+                continue
+            motion = share * own_motion(np.array([*after, velocity[2]]), angle)
+            target = template.target(motion, FINE_PX, through)
+            score = _score(window, target.image, target.region, angle)
+            _, peak, _, (x, y) = cv2.minMaxLoc(score)
+            there = np.array([low[0] + x, low[1] + y, angle])
+            found.append((peak, Guess(there, motion, through)))
     found.sort(key=lambda item: -item[0])
     return [guess for _, guess in found[: 2 * MAX_PEAKS]]
+
+
+def _score(window: np.ndarray, image: np.ndarray, region: np.ndarray, angle: float) -> np.ndarray:
+    """How the region of a patch, turned by an angle, correlates with each place of a window."""
+    turn = np.array([0.0, 0.0, angle])
+    mask = moved(region.astype(np.float32), turn, cv2.BORDER_CONSTANT)
+    score = cv2.matchTemplate(window, moved(image, turn), cv2.TM_CCOEFF_NORMED, mask=mask)
+    score[~np.isfinite(score)] = -1
+    return score

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import distinct, own_motion
+from galileo_jax.tracking.alignment import FINE_PX, Target, align, covariance_of
+from galileo_jax.tracking.exposure import distinct
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import FINE_PX, Fit, Target, align, covariance_of
+from galileo_jax.tracking.pose import own_motion, rotation
 from galileo_jax.tracking.template import Template
 
 
@@ -30,15 +30,10 @@ def velocities_at(poses: np.ndarray, frame: int, clock: np.ndarray) -> Velocitie
     `clock` `[frame]` is when each frame was taken, in usual steps.
     """
     known = np.flatnonzero(np.isfinite(poses[:, 0]))
-    earlier, later = known[known < frame], known[known > frame]
-    before = after = None
-    if len(earlier):
-        before = (poses[frame] - poses[earlier[-1]]) / (clock[frame] - clock[earlier[-1]])
-    if len(later):
-        after = (poses[later[0]] - poses[frame]) / (clock[later[0]] - clock[frame])
-    if before is None:
-        before = after if after is not None else np.zeros_like(poses[frame])
-    return Velocities(before, before if after is None else after)
+    beside = [*known[known < frame][-1:], *known[known > frame][:1]]
+    found = [(poses[at] - poses[frame]) / (clock[at] - clock[frame]) for at in beside]
+    found = found or [np.zeros_like(poses[frame])]
+    return Velocities(found[0], found[-1])
 
 
 @dataclass(frozen=True)
@@ -69,10 +64,8 @@ def refine_pose(
         share * own_motion(velocity, pose[2])
         for velocity in (middle, velocities.before, velocities.after)
     ]
-    fits: list[tuple[Fit, Target]] = []
-    for motion in distinct(motions, template.radius):
-        target = template.target(motion, FINE_PX)
-        fits.append((align(picture, target, pose, stretches=True), target))
+    targets = [template.target(one, FINE_PX) for one in distinct(motions, template.radius)]
+    fits = [(align(picture, target, pose, stretches=True), target) for target in targets]
     best, target = max(fits, key=lambda item: item[0].correlation)
     covariance = covariance_of(best, target, stretches=True)[:2, :2]
     return Refined(

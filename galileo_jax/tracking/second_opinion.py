@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.observation.least_squares import least_squares, polynomial
 from galileo_jax.observation.observation import stretches
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.noise import motion_variance, sudden
+from galileo_jax.tracking.pose import length
 from galileo_jax.tracking.poses_to_track import Finished
 from galileo_jax.tracking.refiner import velocities_at
 from galileo_jax.tracking.silhouette import MOST_MISSED, Path, way_px
@@ -34,10 +36,8 @@ OUTLINE_AREA = (0.3, 6.0)
 """A silhouette's area by that of the declared outline: a smear makes it larger."""
 EDGE_PX = 0.03
 """Standard deviation that sampling a sharp edge with pixels gives the middle of a silhouette."""
-USUAL_SHARE = 0.5
-"""Of a frame's time for which the shutter may be open."""
-ARM = 0.25
-"""Pixels that come and go at the rim are about this share of the size from the middle."""
+USUAL_SHARE = 0.5  # of a frame's time for which the shutter may be open
+ARM = 0.25  # pixels that come and go at the rim are about this share of the size from the middle
 
 
 def needs_silhouette(found: Finished, start: Start) -> bool:
@@ -87,33 +87,43 @@ def with_silhouette(
     place[path.frames] = path.places_px
     place[[not start.uses(index) for index in range(len(place))]] = np.nan
     shown = np.isfinite(place[:, 0])
-    covariance = _covariance(place, clock)
     both = shown & seen
     apart = found.position_px[both] - place[both]
     middle = np.median(apart, axis=0) if both.any() else np.zeros(2)
-    size = float(np.median([part.size_px for part in path.parts]))
+    size = float(np.median(path.sizes_px))
     scatter = np.median(np.abs(apart - middle)) if both.any() else np.inf
     is_fixed = both.sum() >= SAME_FRAMES and scatter < max(SAME_PX, SAME_SIZE * size)
-    more = (shown & ~seen).sum()
-    is_more = more >= max(LEAST_FRAMES, LEAST_SHARE * seen.sum())
+    is_more = (shown & ~seen).sum() >= max(LEAST_FRAMES, LEAST_SHARE * seen.sum())
     if not is_more and not (_turns(found, start) and _is_smoother(found, place, both, clock)):
         return found
     if not is_fixed and way_px(place[shown]) < way_px(found.position_px[seen]):
         return found
-    kept, slow_px = _in_long_runs(seen & ~shown), _slow_px(path)
+    kept, slow_px = np.zeros_like(seen), _slow_px(path)
+    for run in stretches(seen & ~shown):
+        kept[run] = run.stop - run.start >= SAME_FRAMES
     if not is_fixed:
         kept[path.frames[0] :] = False
         last, middle = _led_on(found.position_px, kept, path, size, clock)
         kept[last + 1 :] = False
         if kept.any():
             slow_px = float(np.hypot(slow_px, ON_OBJECT * size))
-    texture, silhouette = found.position_px, place
+    covariance = _covariance(place, clock)
     if start.outline.is_round or not is_fixed:
-        texture = texture - middle
+        place = np.where(kept[:, None], found.position_px - middle, place)
     else:
-        silhouette = silhouette + middle
-    together = np.where(kept[:, None], texture, silhouette)
-    return _joined(found, kept, together, covariance, slow_px)
+        place = np.where(kept[:, None], found.position_px, place + middle)
+    used = np.isfinite(place[:, 0])
+    nothing = np.where(used, 0.0, np.nan)
+    shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
+    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
+    covariance = np.where(kept[:, None, None], found.covariance_px2, covariance)
+    return Finished(
+        position_px=place,
+        covariance_px2=covariance + nothing[:, None, None],
+        common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
+        shifts_px=shifts_px,
+        angle_rad=nothing,
+    )
 
 
 def _led_on(
@@ -136,46 +146,15 @@ def _led_on(
         own = np.arange(last - SAME_FRAMES + 1, last + 1)
         if own[0] < 0 or not kept[own].all():
             continue
-        design = np.vander(clock[own] - clock[last], 3)
-        left = texture_px[own] - design @ np.linalg.lstsq(design, texture_px[own])[0]
+        left = polynomial(clock[own] - clock[last], texture_px[own], 2).left
         if np.sum(left**2) > (SAME_FRAMES - 3) * SAME_PX**2:
             continue
         frames = np.concatenate([own, after])
         design = np.column_stack([np.vander(clock[frames] - clock[last], 3), frames <= last])
         places = np.concatenate([texture_px[own], path.places_px[: len(after)]])
-        apart = np.linalg.lstsq(design, places)[0][-1]
-        return (int(last), apart) if np.hypot(*apart) < size_px else (-1, np.zeros(2))
+        apart = least_squares(design, places).solution[-1]
+        return (int(last), apart) if length(apart) < size_px else (-1, np.zeros(2))
     return -1, np.zeros(2)
-
-
-def _joined(
-    found: Finished,
-    kept: Bool[np.ndarray, " frame"],
-    place: Float[np.ndarray, "frame 2"],
-    covariance: Float[np.ndarray, "frame 2 2"],
-    slow_px: float,
-) -> Finished:
-    """The track of places of which those that are `kept` are by texture."""
-    used = np.isfinite(place[:, 0])
-    nothing = np.where(used, 0.0, np.nan)
-    shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
-    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
-    return Finished(
-        position_px=place,
-        covariance_px2=np.where(kept[:, None, None], found.covariance_px2, covariance)
-        + nothing[:, None, None],
-        common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
-        shifts_px=shifts_px,
-        angle_rad=nothing,
-    )
-
-
-def _in_long_runs(chosen: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
-    """Those of the chosen frames that follow each other for a while."""
-    result = np.zeros_like(chosen)
-    for run in stretches(chosen):
-        result[run] = run.stop - run.start >= SAME_FRAMES
-    return result
 
 
 def _is_own(
@@ -183,7 +162,7 @@ def _is_own(
 ) -> bool:
     """Whether a path of silhouettes is the object's: it moves, and meets the texture's path."""
     place, frames = path.places_px, np.array(path.frames)
-    size = float(np.median([part.size_px for part in path.parts]))
+    size = float(np.median(path.sizes_px))
     if way_px(place) < size or len(frames) < SAME_FRAMES or not seen.any():
         return False
     if start.outline.size_px is not None:
@@ -192,14 +171,15 @@ def _is_own(
             return False
     both = seen[frames]
     if both.sum() >= SAME_FRAMES:
-        own = np.array([part.size_px for part in path.parts])[both]
         off = np.hypot(*(place[both] - position_px[frames[both]]).T)
-        return bool(np.median(off / own) < INSIDE)
+        return bool(np.median(off / path.sizes_px[both]) < INSIDE)
     known = np.flatnonzero(seen)
     nearest = int(known[np.argmin(np.abs(known - frames[0]))])
-    off = np.hypot(*(place[0] - position_px[nearest]))
-    is_next = abs(frames[0] - nearest) <= MOST_MISSED
-    return bool(is_next and off < BESIDE * path.parts[0].size_px)
+    off_px, is_next = (
+        length(place[0] - position_px[nearest]),
+        abs(frames[0] - nearest) <= MOST_MISSED,
+    )
+    return bool(is_next and off_px < BESIDE * path.sizes_px[0])
 
 
 def _turns(found: Finished, start: Start) -> bool:
@@ -241,8 +221,7 @@ def _slow_px(path: Path) -> float:
     area = np.array([part.area_px2 for part in path.parts])
     since = np.linspace(-1, 1, len(area))
     speed = np.hypot(*np.gradient(path.places_px, path.clock, axis=0).T)
-    design = np.column_stack([np.ones_like(since), since, since**2, speed])
-    left = area - design @ np.linalg.lstsq(design, area)[0]
+    left = least_squares(np.column_stack([np.vander(since, 3), speed]), area).left
     # Not of the frame in which it is thrown back, whose smear is folded.
     spread = 1.4826 * np.median(np.abs(left)) * np.sqrt(len(area) / (len(area) - 4))
     return float(ARM * spread / np.sqrt(np.median(area)))

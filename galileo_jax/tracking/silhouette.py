@@ -16,6 +16,8 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
+from galileo_jax.observation.least_squares import polynomial
+from galileo_jax.tracking.pose import length
 from galileo_jax.tracking.template import grey
 
 SCENE_FRAMES = 15
@@ -26,23 +28,16 @@ NOISE_SDS, LEAST_GREY = 6.0, 10.0
 SMOOTH_PX = 1.0
 LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
 """Parts that are smaller, or larger than this share of the picture, are no objects."""
-MOST_FOREGROUND = 0.3
-"""If more of a picture differs the camera moves."""
-SAME_AREA = 1.5
-"""From a frame to the next an object's silhouette grows or shrinks by less."""
+MOST_FOREGROUND = 0.3  # if more of a picture differs the camera moves
+SAME_AREA = 1.5  # from a frame to the next an object's silhouette grows or shrinks by less
 OFF_SIZE, OFF_STEP = 0.6, 0.35
 """How far a part may be from where a path leads, by its size and by the way it goes."""
 MOST_AT_FIRST = 4.0
 """By so many of its sizes a thing is at most gone in the frame after the one that shows it first: a
 ball of 15 pixels by 60."""
-MOST_MISSED = 4.0
-"""Usual steps for which a path may be hidden."""
-TURN_BACK = 1.3
-"""What comes off a wall is at most so many of its steps away from where it was."""
-TERMS = 3
-"""Of the parabola that leads on: place, velocity, acceleration."""
-LEADS_FRAMES = 4
-"""From so many frames."""
+MOST_MISSED = 4.0  # usual steps for which a path may be hidden
+TURN_BACK = 1.3  # what comes off a wall is at most so many of its steps away from where it was
+LEADS_FRAMES, DEGREE = 4, 2  # A parabola through so many frames leads on
 
 
 @dataclass(frozen=True)
@@ -66,10 +61,6 @@ class Part:
         """The side of a square as large."""
         return float(np.sqrt(self.area_px2))
 
-    def holds(self, place: np.ndarray) -> bool:
-        """Whether a place is within the box around it."""
-        return bool((place >= self.low_px).all() and (place <= self.high_px).all())
-
 
 def way_px(places: Float[np.ndarray, "frame 2"]) -> float:
     """The diagonal of the box that holds places, px."""
@@ -90,32 +81,36 @@ class Path:
         return np.stack([part.centre_px for part in self.parts])
 
     @property
+    def sizes_px(self) -> Float[np.ndarray, " frame"]:
+        """How large it was."""
+        return np.array([part.size_px for part in self.parts])
+
+    @property
     def way_px(self) -> float:
         """How far it went: the diagonal of the box that holds its places."""
         return way_px(self.places_px)
 
-    def expected(self, now: float) -> np.ndarray:
-        """Where it should be at a time: by a parabola, at first by a line."""
-        last = np.array(self.clock[-LEADS_FRAMES:])
-        terms = min(TERMS, len(last))
-        design = np.vander(last - now, terms, increasing=True)
-        return np.linalg.lstsq(design, self.places_px[-LEADS_FRAMES:])[0][0]
+    def append(self, frame: int, now: float, part: Part) -> None:
+        """One frame further."""
+        self.frames.append(frame)
+        self.clock.append(now)
+        self.parts.append(part)
 
     def misses(self, part: Part, now: float) -> float:
         """How far a part is from where it should be, by how far it may be; inf: another thing."""
         last = self.parts[-1]
-        ratio = part.area_px2 / last.area_px2
-        if not 1 / SAME_AREA < ratio < SAME_AREA:
+        if not 1 / SAME_AREA < part.area_px2 / last.area_px2 < SAME_AREA:
             return np.inf
-        # The frame in which it is thrown back shows neither the speed before nor the one after.
-        moved = np.hypot(*np.diff(self.places_px[-LEADS_FRAMES:], axis=0).T)
-        speeds = moved / np.diff(self.clock[-LEADS_FRAMES:])
-        way = float(speeds.max(initial=0.0)) * (now - self.clock[-1])
-        off = float(np.hypot(*(part.centre_px - self.expected(now))))
-        back = float(np.hypot(*(part.centre_px - last.centre_px)))
+        back = length(part.centre_px - last.centre_px)
         if len(self.parts) == 1:  # nobody knows how fast it is
             return back / (MOST_AT_FIRST * last.size_px)
-        near = off / (OFF_SIZE * last.size_px + OFF_STEP * way)
+        clock, places = np.array(self.clock[-LEADS_FRAMES:]), self.places_px[-LEADS_FRAMES:]
+        # By a parabola, at first by a line.
+        expected = polynomial(clock - now, places, min(DEGREE, len(clock) - 1)).solution[-1]
+        # The frame in which it is thrown back shows neither the speed before nor the one after.
+        speeds = np.hypot(*np.diff(places, axis=0).T) / np.diff(clock)
+        way = float(speeds.max()) * (now - clock[-1])
+        near = length(part.centre_px - expected) / (OFF_SIZE * last.size_px + OFF_STEP * way)
         # What is thrown back is nearer to where it was than its way.
         return min(near, 0.5 + 0.5 * back / (TURN_BACK * way + OFF_SIZE * last.size_px))
 
@@ -133,8 +128,7 @@ def paths_of(
     done: list[Path] = []
     going: list[Path] = []
     for index, frame in enumerate(open_frames()):
-        parts = _parts(grey(frame), scene)
-        now = float(clock[index])
+        parts, now = _parts(grey(frame), scene), float(clock[index])
         done += [path for path in going if now - path.clock[-1] > MOST_MISSED]
         going = [path for path in going if now - path.clock[-1] <= MOST_MISSED]
         pairs = [
@@ -142,21 +136,14 @@ def paths_of(
             for i, path in enumerate(going)
             for j, part in enumerate(parts)
         ]
-        left, free = set(range(len(parts))), set(range(len(going)))
+        led, free = set(), set(range(len(going)))
         for off, i, j in sorted(pairs):
-            if off < 1 and i in free and j in left:
+            if off < 1 and i in free and j not in led:
                 free.remove(i)
-                left.remove(j)
-                _append(going[i], index, now, parts[j])
-        for j in left:
-            going.append(Path([index], [now], [parts[j]]))
+                led.add(j)
+                going[i].append(index, now, parts[j])
+        going += [Path([index], [now], [part]) for j, part in enumerate(parts) if j not in led]
     return done + going
-
-
-def _append(path: Path, index: int, now: float, part: Part) -> None:
-    path.frames.append(index)
-    path.clock.append(now)
-    path.parts.append(part)
 
 
 def _scene(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> np.ndarray:
@@ -180,8 +167,8 @@ def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
     height, width = mask.shape
     found = []
     for (left, top, wide, high, area), centre in zip(stats[1:], centres[1:], strict=True):
-        is_cut = left == 0 or top == 0 or left + wide == width or top + high == height
+        low, end = np.array([left, top]), np.array([left + wide, top + high])
+        is_cut = (low == 0).any() or (end == (width, height)).any()
         if not is_cut and LEAST_AREA_PX2 <= area <= MOST_SHARE * mask.size:
-            low, high_px = np.array([left, top]), np.array([left + wide - 1, top + high - 1])
-            found.append(Part(centre, float(area), low, high_px))
+            found.append(Part(centre, float(area), low, end - 1))
     return sorted(found, key=lambda part: -part.area_px2)[:MOST_PARTS]

@@ -5,7 +5,7 @@ goes: whatever is followed as a rigid pattern would drift within it. So frames a
 first, by the declared rectangle and lens, and the track is put back into the picture's pixels.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import cv2
@@ -13,11 +13,13 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.clip.picture_plane import PicturePlane, picture_plane
-from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.tracking.track import Track
 
 LARGEST = 2.0  # of the picture's own size: far parts of an oblique plane would fill a wall
 OUTSIDE = -1e4  # a pixel that is in no picture
+
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,9 @@ class SquareView:
         """The way back; NaN where the picture does not show the plane."""
         return self.plane.to_pixels(self.view.to_metres(points_px))
 
-    def shown(self, place_px: tuple[float, float] | None) -> tuple[float, float] | None:
+    def shown(self, place_px: Place | None) -> Place | None:
         """Where the picture shows a place of the view; None for None."""
-        if place_px is None:
-            return None
-        x, y = self.to_picture(np.array(place_px))
-        return float(x), float(y)
+        return place_px and _mapped(self.to_picture, place_px)
 
     def drawn(self, frames: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
         """Frames of the picture as the view shows them."""
@@ -60,29 +59,15 @@ class SquareView:
     def clip(self, clip: Clip) -> Clip:
         """The clip as if it had been filmed square."""
 
-        def moved(point: tuple[float, float] | None) -> tuple[float, float] | None:
-            if point is None:
-                return None
-            x, y = self.from_picture(np.array(point))
-            return float(x), float(y)
+        def moved(item: ClipObject) -> ClipObject:
+            there = item.point_px and _mapped(self.from_picture, item.point_px)
+            later = ((at, *_mapped(self.from_picture, (x, y))) for at, x, y in item.corrections)
+            return item.model_copy(update={"point_px": there, "corrections": tuple(later)})
 
-        def corrected(frame: int, x: float, y: float) -> tuple[int, float, float]:
-            there = self.from_picture(np.array([x, y]))
-            return frame, float(there[0]), float(there[1])
-
-        objects = tuple(
-            item.model_copy(
-                update={
-                    "point_px": moved(item.point_px),
-                    "corrections": tuple(corrected(*each) for each in item.corrections),
-                }
-            )
-            for item in clip.objects
-        )
+        origin_px = clip.origin_px and _mapped(self.from_picture, clip.origin_px)
+        objects = tuple(map(moved, clip.objects))
         square = {"rectangle": None, "lens": None, "frame_size_px": self.size_px}
-        return clip.model_copy(
-            update=square | {"objects": objects, "origin_px": moved(clip.origin_px)}
-        )
+        return clip.model_copy(update=square | {"objects": objects, "origin_px": origin_px})
 
     def track(self, found: Track, clip: Clip) -> Track:
         """A track of the view, in the picture's pixels."""
@@ -104,6 +89,12 @@ class SquareView:
             shifts_px=shifts,
             frame_size_px=clip.frame_size_px,
         )
+
+
+def _mapped(by: Callable[[np.ndarray], np.ndarray], place_px: Place) -> Place:
+    """A place of a picture in another."""
+    x, y = by(np.array(place_px))
+    return float(x), float(y)
 
 
 def square_view(clip: Clip) -> SquareView:

@@ -6,8 +6,8 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from galileo_jax.tracking.alignment import FINE_PX, Target
 from galileo_jax.tracking.pose import patch_at, rotation, smear
-from galileo_jax.tracking.refine import FINE_PX, Target
 
 CORE_SHARE = 0.88
 """Only this share of the declared size is compared: the rim shows background when the scale
@@ -16,14 +16,12 @@ RIM_SHARE = 1.4
 """An object without texture of its own is compared up to this share of its size instead: its
 edge against what is behind it."""
 PLAIN = 2.0e3
-"""Texture (see `texture_of`) below which an object counts as without: with a noise of five grey
+"""Texture (see `template_at`) below which an object counts as without: with a noise of five grey
 levels its place would be known to 0.1 px only."""
 WINDOW_PX = 21
 """Side of the region when the size is unknown: the object and some of what is around it."""
-ALWAYS = 0.99
-"""A pixel is compared that the object covers for at least this share of the exposure."""
-MIN_REGION_SHARE = 0.3
-"""A smeared region never shrinks below this share of the sharp one."""
+ALWAYS = 0.99  # A pixel is compared that the object covers for at least this share of the exposure
+MIN_REGION_SHARE = 0.3  # A smeared region never shrinks below this share of the sharp one
 
 
 @dataclass(frozen=True)
@@ -100,22 +98,20 @@ class Template:
 
 def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
     """The template of the object at `point_px` in the grey `image`."""
+
+    def cut(share: float) -> Template:
+        region = region_of(outline, share)
+        patch = patch_at(image, np.array([*point_px, 0.0]), region.shape[0] // 2)
+        return Template(patch, region)
+
     if outline.size_px is None:
         outline = Outline((WINDOW_PX, WINDOW_PX), outline.angle_rad)
-        return _cut(image, point_px, region_of(outline, 1.0))
-    core = _cut(image, point_px, region_of(outline, CORE_SHARE))
-    if texture_of(core) >= PLAIN:
-        return core
-    return _cut(image, point_px, region_of(outline, RIM_SHARE))
-
-
-def texture_of(template: Template) -> float:
-    """The smaller eigenvalue of the summed structure tensor, grey levels^2 (Shi, Tomasi 1994).
-
-    The variance of the place is the noise's variance divided by it.
-    """
-    gradients = Target(template.image, template.region, FINE_PX).normal[:2, :2]
-    return float(np.linalg.eigvalsh(gradients)[0])
+        return cut(1.0)
+    core = cut(CORE_SHARE)
+    # The smaller eigenvalue of the summed structure tensor, grey levels^2 (Shi, Tomasi 1994): the
+    # variance of the place is the noise's variance divided by it.
+    texture = float(np.linalg.eigvalsh(core.sharp(FINE_PX).normal[:2, :2])[0])
+    return core if texture >= PLAIN else cut(RIM_SHARE)
 
 
 def region_of(outline: Outline, share: float) -> np.ndarray:
@@ -124,15 +120,8 @@ def region_of(outline: Outline, share: float) -> np.ndarray:
     half = np.array(outline.size_px) * share / 2
     radius = int(np.ceil(np.hypot(*half))) + 2
     grid = np.arange(-radius, radius + 1, dtype=float)
-    x, y = np.meshgrid(grid, grid)
-    own = np.stack([x, y], axis=-1) @ rotation(outline.angle_rad)
-    if outline.is_round:
-        return np.hypot(own[..., 0] / half[0], own[..., 1] / half[1]) <= 1
-    return (np.abs(own[..., 0]) <= half[0]) & (np.abs(own[..., 1]) <= half[1])
-
-
-def _cut(image: np.ndarray, point_px: np.ndarray, region: np.ndarray) -> Template:
-    return Template(patch_at(image, np.array([*point_px, 0.0]), region.shape[0] // 2), region)
+    own = np.stack(np.meshgrid(grid, grid), axis=-1) @ rotation(outline.angle_rad) / half
+    return (np.hypot(*own.T).T if outline.is_round else np.abs(own).max(axis=-1)) <= 1
 
 
 def median_template(patches: list[np.ndarray], region: np.ndarray) -> Template:

@@ -1,16 +1,19 @@
 """A track: where each object was in every frame, in pixels, with an error."""
 
+import csv
+import io
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.runtime.atomic_write import write_text
+
 
 @dataclass(frozen=True)
 class Track:
-    """Pixel positions of the objects in every frame.
-
-    The only thing that tracking hands on; pixels end in `observation`.
+    """Pixel positions of the objects in every frame: the only thing that tracking hands on.
 
     Attributes:
       names: the objects' names, in the clip's order.
@@ -39,3 +42,31 @@ class Track:
     angle_rad: Float[np.ndarray, "object frame"]
     is_visible: Bool[np.ndarray, "object frame"]
     frame_size_px: tuple[int, int]
+
+
+def write_pixel_csv(path: Path, track: Track) -> None:
+    """Writes `time_s`, then per object place, its error and angle; empty cell = not visible.
+
+    Columns of `NAME`: `NAME_x_px, NAME_y_px` (x right, y down), `NAME_sd_x_px, NAME_sd_y_px`,
+    `NAME_correlation` (of the two errors) and `NAME_angle_deg` (since the first frame,
+    clockwise).
+    """
+    columns = {"time_s": track.times_s}
+    for k, name in enumerate(track.names):
+        sd = np.sqrt(np.einsum("fii->fi", track.covariance_px2[k]))
+        fields = {
+            "x_px": track.position_px[k, :, 0],
+            "y_px": track.position_px[k, :, 1],
+            "sd_x_px": sd[:, 0],
+            "sd_y_px": sd[:, 1],
+            "correlation": track.covariance_px2[k, :, 0, 1] / sd.prod(axis=1),
+            "angle_deg": np.degrees(track.angle_rad[k]),
+        }
+        for field, values in fields.items():
+            columns[f"{name}_{field}"] = np.where(track.is_visible[k], values, np.nan)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow([f"{v:.8g}" if np.isfinite(v) else "" for v in row])
+    write_text(path, text.getvalue())

@@ -2,7 +2,8 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
-MAX_KEPT_BYTES = 256 << 20
-"""Of a longer video the second pass decodes the frames again."""
+FIELDS = tuple(field.name for field in fields(Finished))
+MAX_KEPT_BYTES = 256 << 20  # of a longer video the second pass decodes the frames again
 
 
 @dataclass(frozen=True)
@@ -65,37 +66,31 @@ def track_video(
     """
     clock = in_steps(times_s)
     first = _from_frame_to_frame(open_frames, starts, clock, advance)
-    count, flat = first.count, [(k, piece) for k, own in enumerate(first.pieces) for piece in own]
-    shares, fits = _in_every_frame(first, flat, open_frames, clock, advance)
+    count, flat = first.count, [piece for own in first.pieces for piece in own]
+    shares, fits = _in_every_frame(first, open_frames, clock, advance)
     coding = coding or Coding(np.zeros(count, bool))
-    done = finished(
-        fits, [piece for _, piece in flat], shares, coding, clock[:count], len(starts) == 1
-    )
-    objects = [
-        joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
-        for k in range(len(starts))
-    ]
-    objects = _with_silhouettes(objects, starts, open_frames, clock)
+    done = iter(finished(fits, flat, shares, coding, clock[:count], len(starts) == 1))
+    objects = [joined([next(done) for _ in own], count) for own in first.pieces]
+    if len(objects) == 1 and needs_silhouette(objects[0], starts[0]):
+        # Those of two objects that touch are one, whose middle is neither's.
+        objects = [with_silhouette(objects[0], starts[0], paths_of(open_frames, clock), clock)]
+    stacked = {name: np.stack([getattr(item, name) for item in objects]) for name in FIELDS}
     return Track(
         names=tuple(start.name for start in starts),
         times_s=times_s[:count],
-        position_px=np.stack([item.position_px for item in objects]),
-        covariance_px2=np.stack([item.covariance_px2 for item in objects]),
-        common_px2=np.stack([item.common_px2 for item in objects]),
-        shifts_px=np.stack([item.shifts_px for item in objects]),
-        angle_rad=np.stack([item.angle_rad for item in objects]),
-        is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
+        is_visible=np.isfinite(stacked["angle_rad"]),
         frame_size_px=first.size_px,
+        **stacked,
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class _FirstPass:
     """What following from frame to frame gives.
 
     Attributes:
       pieces: of each start.
-      kept: the pictures that are kept for the second pass.
+      kept: what is around the objects.
       exposure: as far as smears show it.
       count: of frames.
       size_px: of the picture.
@@ -104,8 +99,8 @@ class _FirstPass:
     pieces: list[list[Piece]]
     kept: "_Kept"
     exposure: Exposure
-    count: int
-    size_px: tuple[int, int]
+    count: int = 0
+    size_px: tuple[int, int] = (0, 0)
 
 
 def _from_frame_to_frame(
@@ -115,65 +110,57 @@ def _from_frame_to_frame(
     advance: Callable[[Seen | None], None],
 ) -> _FirstPass:
     """The first pass of `track_video`; `clock` in usual steps."""
-    exposure, kept = Exposure(), _Kept(len(starts))
-    pieces: list[list[Piece]] = [[] for _ in starts]
-    before: Picture | None = None
-    count, size_px = 0, (0, 0)
+    first = _FirstPass([[] for _ in starts], _Kept(len(starts)), Exposure())
+    pieces, before = first.pieces, None
     for index, frame in enumerate(open_frames()):
         picture = Picture(grey(frame))
         used = [k for k, start in enumerate(starts) if start.uses(index)]
         for k in used:
             beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
             step = clock[index] - clock[index - 1] if index else 1.0
-            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside, step)
+            follow_on(pieces[k], starts[k], index, before, picture, first.exposure, beside, step)
         keep_apart([pieces[k][-1] for k in used], index, before, picture)
         for k in used:
-            kept.add(k, index, picture, pieces[k][-1].follower)
+            first.kept.add(k, index, picture, pieces[k][-1].follower)
         before = picture
-        count, size_px = index + 1, picture.size_px
+        first.count, first.size_px = index + 1, picture.size_px
         advance(Seen(index, tuple(_place(own, index) for own in pieces)))
-    return _FirstPass(pieces, kept, exposure, count, size_px)
+    return first
 
 
 def _in_every_frame(
     first: _FirstPass,
-    flat: Sequence[tuple[int, Piece]],
     open_frames: Callable[[], Iterable[np.ndarray]],
     clock: np.ndarray,
     advance: Callable[[Seen | None], None],
 ) -> tuple[list[float], list[list[Refined | None]]]:
     """The second pass: of each piece its shares of a frame's time, and its pose in each frame."""
-    coarse = [piece.poses(first.count) for _, piece in flat]
-    templates = [_final_template(piece.follower) for _, piece in flat]
-    of = [k for k, _ in flat]
-    shares = _learnt(first.kept, open_frames, of, coarse, templates, first.exposure, clock)
-    fits: list[list[Refined | None]] = [[] for _ in flat]
+    looks = [
+        _Look(k, piece, piece.poses(first.count), _final_template(piece.follower))
+        for k, own in enumerate(first.pieces)
+        for piece in own
+    ]
+    shares = _learnt(first, looks, open_frames, clock)
+    fits: list[list[Refined | None]] = [[] for _ in looks]
     for index, pictures in enumerate(first.kept.pictures(open_frames, first.count)):
-        each = zip(flat, coarse, templates, shares, fits, strict=True)
-        for (k, piece), poses, template, share, found in each:
-            picture = pictures[k]
-            if picture is None or not np.isfinite(poses[index, 0]):
+        for look, share, found in zip(looks, shares, fits, strict=True):
+            picture, pose = pictures[look.k], look.poses[index]
+            if picture is None or not np.isfinite(pose[0]):
                 found.append(None)
                 continue
-            velocities = piece.velocities(poses, index, clock)
-            found.append(refine_pose(picture, template, poses[index], velocities, share))
+            velocities = look.piece.velocities(look.poses, index, clock)
+            found.append(refine_pose(picture, look.template, pose, velocities, share))
         advance(None)
     return shares, fits
 
 
-def _with_silhouettes(
-    objects: Sequence[Finished],
-    starts: Sequence[Start],
-    open_frames: Callable[[], Iterable[np.ndarray]],
-    clock: np.ndarray,
-) -> list[Finished]:
-    """The objects, a lone one that its texture loses by its silhouette.
+class _Look(NamedTuple):
+    """A piece of object `k` after the first pass: poses `[frame, 3]`, and its final template."""
 
-    Those of two objects that touch are one, whose middle is neither's.
-    """
-    if len(objects) > 1 or not needs_silhouette(objects[0], starts[0]):
-        return list(objects)
-    return [with_silhouette(objects[0], starts[0], paths_of(open_frames, clock), clock)]
+    k: int
+    piece: Piece
+    poses: np.ndarray
+    template: Template
 
 
 class _Kept:
@@ -216,51 +203,37 @@ def _final_template(follower: Follower) -> Template:
 
 
 def _learnt(
-    kept: _Kept,
+    first: _FirstPass,
+    looks: Sequence[_Look],
     open_frames: Callable[[], Iterable[np.ndarray]],
-    objects: Sequence[int],
-    poses: Sequence[np.ndarray],
-    templates: Sequence[Template],
-    exposure: Exposure,
     clock: np.ndarray,
 ) -> list[float]:
     """The open share of a frame's time for each piece, where the first pass has not learned it.
 
     What was smeared in its first frame shows it only once there is a sharp look of it. Where there
     never is, the share is that by which the pictures are smeared more than the template.
-
-    Args:
-      kept: what the first pass saw.
-      open_frames: gives the video's frames again.
-      objects: of each piece.
-      poses: of each piece, `[frame, 3]`.
-      templates: of each piece, final.
-      exposure: what the first pass has learned.
-      clock: `[frame]`, when each was taken, in usual steps.
     """
-    blurred = [k for k, template in enumerate(templates) if not template.is_sharp]
-    is_learnt = exposure.frames >= LEARNT_FRAMES
-    if is_learnt and not blurred:
-        return [exposure.share] * len(objects)
-    own = {k: Exposure() for k in blurred}
-    as_sharp = [replace(template, moved=np.zeros(3)) for template in templates]
-    for index, pictures in enumerate(kept.pictures(open_frames, len(poses[0]) if poses else 0)):
-        for k, path in enumerate(poses):
-            picture = pictures[objects[k]]
-            if picture is None or not np.isfinite(path[index, 0]) or (k not in own and is_learnt):
-                continue
-            told = velocities_at(path, index, clock)
-            into = own.get(k, exposure)
-            into.add(picture, as_sharp[k], path[index], (told.before + told.after) / 2)
-    return [own.get(k, exposure).share for k in range(len(objects))]
+    own = {k: Exposure() for k, look in enumerate(looks) if not look.template.is_sharp}
+    is_learnt = first.exposure.frames >= LEARNT_FRAMES
+    asked = [k for k in range(len(looks)) if k in own or not is_learnt]
+    as_sharp = {k: replace(looks[k].template, moved=np.zeros(3)) for k in asked}
+    if asked:
+        for index, pictures in enumerate(first.kept.pictures(open_frames, first.count)):
+            for k in asked:
+                picture, poses = pictures[looks[k].k], looks[k].poses
+                if picture is not None and np.isfinite(poses[index, 0]):
+                    told = velocities_at(poses, index, clock)
+                    velocity = (told.before + told.after) / 2
+                    into = own.get(k, first.exposure)
+                    into.add(picture, as_sharp[k], poses[index], velocity)
+    return [own.get(k, first.exposure).share for k in range(len(looks))]
 
 
 def in_steps(times_s: np.ndarray) -> np.ndarray:
     """`[frame]`: when each frame was taken, in units of the usual step from one to the next."""
     steps = np.diff(times_s)
-    usual = float(np.median(steps)) if len(steps) else 1.0
     # Rounding of times is no unevenness.
-    return np.concatenate([[0.0], np.cumsum(np.round(steps / usual, 6))])
+    return np.append(0.0, np.cumsum(np.round(steps / np.median(steps), 6)) if len(steps) else [])
 
 
 def _place(pieces: list[Piece], index: int) -> tuple[float, float] | None:

@@ -4,7 +4,7 @@ import functools
 import itertools
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,9 @@ MIN_FRAMES = 4
 MAX_MISSING_SHARE = 0.02
 """Pictures announced but not decodable that are only warned of: containers miscount by one or
 two."""
-BLOCK_PX = 8
-"""Pictures are compared by the mean difference of blocks, which noise hardly changes."""
-SQUARE = 1e-3
-"""Pixels whose sides differ by less are taken as square."""
-KINDS = "?IPBSipb"
-"""FFmpeg's kinds of pictures by number."""
+BLOCK_PX = 8  # pictures are compared by the mean difference of blocks, which noise hardly changes
+SQUARE = 1e-3  # pixels whose sides differ by less are taken as square
+KINDS = "?IPBSipb"  # FFmpeg's kinds of pictures by number
 FIELDS = "bwdif=mode=send_field:parity={}"
 """FFmpeg's filter that makes of each interlaced picture two, one for each of its fields."""
 
@@ -70,10 +67,15 @@ def frames(path: Path) -> Iterator[np.ndarray]:
     """
     path = Path(path)
     scan = _scan(path)
-    used = _used(scan)
-    for is_used, frame in zip(used, _stream(path, scan.first_field), strict=False):
-        if is_used:
-            yield _picture(frame, "bgr24", scan)
+    with _opened(path) as opened:
+        for is_used, frame in zip(scan.used, _shown(*opened, scan.first_field), strict=False):
+            if not is_used:
+                continue
+            picture = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90) % 4)
+            picture = np.ascontiguousarray(picture)
+            if picture.shape[1::-1] != scan.size_px:
+                picture = cv2.resize(picture, scan.size_px, interpolation=cv2.INTER_LANCZOS4)
+            yield picture
 
 
 def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
@@ -90,12 +92,7 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     _check_whole(path, scan)
     film = clock_of(_stamps(path, scan, fps_declared), scan.tick_s)
     fields = 2 if scan.is_interlaced else 1
-    warnings = [f"{path}: {line}" for line in (*scan.warnings, *_left_out(scan))]
-    if scan.missing:
-        count = len(scan.kinds)
-        warnings.append(
-            f"{path}: {count} of {count + scan.missing} announced frames can be decoded"
-        )
+    warnings = [f"{path}: {line}" for line in scan.warnings()]
     rate = scan.rate if abs(scan.rate * fields / film.rate - 1) < 1e-3 else film.rate / fields
     clock, fps = film, rate
     if fps_declared:
@@ -106,7 +103,7 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
                 f"{path}: fps: {fps:g} declared, the container says {compared / fields:.4g}; "
                 f"{fps:g} is used"
             )
-    times_s = clock.times_s[_used(scan)]
+    times_s = clock.times_s[scan.used]
     return VideoInfo(scan.size_px, fps, rate, tuple((times_s - times_s[0]).tolist()), (*warnings,))
 
 
@@ -137,11 +134,9 @@ def predicted_from_before(path: Path) -> np.ndarray:
     kinds = np.array(list(scan.kinds.replace("?", "P")))
     is_predicted = kinds == "P"
     is_predicted[1:] &= kinds[:-1] != "B"
-    used = _used(scan)
     # What comes after a picture that is left out is not predicted from the one before that.
-    is_predicted[1:] &= used[:-1]
-    is_recoded = scan.is_interlaced or not _is_square(scan.pixel_aspect)
-    return is_predicted[used] & (not is_recoded)
+    is_predicted[1:] &= scan.used[:-1]
+    return is_predicted[scan.used] & (scan.is_square and not scan.is_interlaced)
 
 
 @dataclass(frozen=True)
@@ -161,7 +156,6 @@ class _Scan:
       contrast: `[picture]`, grey levels.
       rate: pictures per second that the container states; 0: none.
       missing: pictures that it announces and that are not there.
-      warnings: doubts.
     """
 
     size_px: tuple[int, int]
@@ -175,16 +169,49 @@ class _Scan:
     contrast: np.ndarray
     rate: float
     missing: int
-    warnings: tuple[str, ...]
 
     @property
     def is_interlaced(self) -> bool:
         """Whether pictures are fields."""
         return self.first_field is not None
 
+    @property
+    def is_square(self) -> bool:
+        """Whether pixels are as wide as high."""
+        return abs(self.pixel_aspect - 1) < SQUARE
 
-def _is_square(aspect: float) -> bool:
-    return abs(aspect - 1) < SQUARE
+    @property
+    def used(self) -> np.ndarray:
+        """`[picture]`: which are looked at."""
+        return ~(is_blank(self.contrast) | repeats(self.change))
+
+    def warnings(self) -> Iterator[str]:
+        """What is said of the film, and of pictures that are not looked at."""
+        if not self.is_square:
+            yield (
+                f"pixels are {self.pixel_aspect:.4g} times as wide as high; pictures are taken as "
+                f"{self.size_px[0]} x {self.size_px[1]} square ones, as players show them"
+            )
+        if self.is_interlaced:
+            yield (
+                "interlaced: each picture is taken as two, one for each of its fields, with their "
+                "own times; frame numbers count fields"
+            )
+        blank = is_blank(self.contrast)
+        counted = "; frame numbers count the others"
+        if blank.any():
+            numbers, word = np.flatnonzero(blank), "is" if blank.sum() == 1 else "are"
+            yield f"picture {listed(numbers)} {word} black, blank or faded and left out{counted}"
+        numbers, total = np.flatnonzero(repeats(self.change) & ~blank), len(blank)
+        if len(numbers):
+            kept = total - len(numbers)
+            often = f", each is there {round(total / kept)} times" if total % kept == 0 else ""
+            yield (
+                f"{len(numbers)} of {total} pictures repeat the one before{often} "
+                f"({listed(numbers)}): left out{counted}"
+            )
+        if self.missing:
+            yield f"{total} of {total + self.missing} announced frames can be decoded"
 
 
 @contextmanager
@@ -212,29 +239,22 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         yield container, stream
 
 
-def _stream(path: Path, first: str | None) -> Iterator[Any]:
-    """The film's frames in the order in which they are shown; damaged parts are passed over."""
-    with _opened(path) as (container, stream):
-        yield from _shown(container, stream, first)
-
-
 def _shown(container: Any, stream: Any, first: str | None) -> Iterator[Any]:
-    """The frames, or the fields that they are woven from."""
+    """The frames in the order in which they are shown, or the fields that they are woven from."""
     decoded = _decoded(container, stream)
     return decoded if first is None else _filtered(decoded, stream, FIELDS.format(first))
 
 
 def _decoded(container: Any, stream: Any) -> Iterator[Any]:
+    """All frames; damaged parts are passed over."""
     packets = container.demux(stream)
     while True:
         try:
             packet = next(packets)
         except (StopIteration, av.error.FFmpegError):
             return
-        try:
+        with suppress(av.error.FFmpegError):  # of this packet; what follows may be whole
             yield from packet.decode()
-        except av.error.FFmpegError:  # of this packet; what follows may be whole
-            continue
 
 
 def _filtered(decoded: Iterator[Any], stream: Any, filter_: str) -> Iterator[Any]:
@@ -249,26 +269,6 @@ def _filtered(decoded: Iterator[Any], stream: Any, filter_: str) -> Iterator[Any
                 yield graph.vpull()
             except (av.error.BlockingIOError, av.error.EOFError):
                 break
-
-
-def _picture(frame: Any, format_: str, scan: _Scan) -> np.ndarray:
-    """A frame as it is shown: upright, with square pixels."""
-    picture = _upright(frame.to_ndarray(format=format_), frame.rotation)
-    if picture.shape[1::-1] != scan.size_px:
-        picture = cv2.resize(picture, scan.size_px, interpolation=cv2.INTER_LANCZOS4)
-    return picture
-
-
-def _upright(picture: np.ndarray, rotation_deg: int) -> np.ndarray:
-    return np.ascontiguousarray(np.rot90(picture, round(rotation_deg / 90) % 4))
-
-
-def _shown_size(frame: Any, aspect: float) -> tuple[int, int]:
-    """(width, height) of a frame with square pixels, none of which is smaller than before."""
-    width, height = frame.width, frame.height
-    if not _is_square(aspect):
-        width, height = (round(width * max(aspect, 1)), round(height * max(1 / aspect, 1)))
-    return (height, width) if round(frame.rotation / 90) % 2 else (width, height)
 
 
 def _scan(path: Path) -> _Scan:
@@ -293,8 +293,7 @@ def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
     stamps_s, kinds, change, contrast, rows = [], [], [], [], NO_ROWS
     size_px, tick_s, before = (0, 0), 0.0, None
     with _opened(path) as (container, stream):
-        aspect = float(stream.sample_aspect_ratio or 1)
-        rate = float(stream.average_rate or 0)
+        aspect, rate = float(stream.sample_aspect_ratio or 1), float(stream.average_rate or 0)
         is_even = container.format.name == "avi"  # whose stamps are the order of coding
         for frame in _shown(container, stream, first):
             grey = frame.to_ndarray(format="gray")
@@ -311,9 +310,17 @@ def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
     stamps = np.sort(stamps_s) if is_even else np.array(stamps_s)
     scan = _Scan(
         size_px, aspect, first, stamps, is_even, tick_s, "".join(kinds), np.array(change),
-        np.array(contrast), rate, missing, _said(size_px, aspect, first is not None),
+        np.array(contrast), rate, missing,
     )  # fmt: skip
     return scan, rows
+
+
+def _shown_size(frame: Any, aspect: float) -> tuple[int, int]:
+    """(width, height) of a frame with square pixels, none of which is smaller than before."""
+    width, height = frame.width, frame.height
+    if abs(aspect - 1) >= SQUARE:
+        width, height = (round(width * max(aspect, 1)), round(height * max(1 / aspect, 1)))
+    return (height, width) if round(frame.rotation / 90) % 2 else (width, height)
 
 
 def _change(before: np.ndarray, grey: np.ndarray) -> float:
@@ -323,21 +330,6 @@ def _change(before: np.ndarray, grey: np.ndarray) -> float:
     size = tuple(max(1, side // BLOCK_PX) for side in grey.shape[::-1])
     differs = cv2.resize(cv2.absdiff(grey, before), size, interpolation=cv2.INTER_AREA)
     return float(differs.max())
-
-
-def _said(size_px: tuple[int, int], aspect: float, is_interlaced: bool) -> tuple[str, ...]:
-    said = []
-    if not _is_square(aspect):
-        said.append(
-            f"pixels are {aspect:.4g} times as wide as high; pictures are taken as "
-            f"{size_px[0]} x {size_px[1]} square ones, as players show them"
-        )
-    if is_interlaced:
-        said.append(
-            "interlaced: each picture is taken as two, one for each of its fields, with their own "
-            "times; frame numbers count fields"
-        )
-    return tuple(said)
 
 
 def _num_missing(container: Any, stream: Any, stamps_s: np.ndarray) -> int:
@@ -364,7 +356,7 @@ def _num_missing(container: Any, stream: Any, stamps_s: np.ndarray) -> int:
 
 
 def _check_whole(path: Path, scan: _Scan) -> None:
-    count = len(scan.kinds)
+    count, left = len(scan.kinds), int(scan.used.sum())
     if count < MIN_FRAMES:
         raise InputError(
             f"{path}: only {count} frame(s); a video of at least {MIN_FRAMES} frames expected"
@@ -375,34 +367,10 @@ def _check_whole(path: Path, scan: _Scan) -> None:
             f"{path}: cut off or damaged: only {count} of {announced} frames can be decoded; "
             "copy it again, or re-encode what is there"
         )
-    left = int(_used(scan).sum())
     if left < MIN_FRAMES:
         raise InputError(
             f"{path}: only {left} of {count} frames are neither blank nor repeat the one before; "
             f"at least {MIN_FRAMES} expected"
-        )
-
-
-def _used(scan: _Scan) -> np.ndarray:
-    """`[picture]`: which are looked at."""
-    return ~(is_blank(scan.contrast) | repeats(scan.change))
-
-
-def _left_out(scan: _Scan) -> Iterator[str]:
-    """What is said of pictures that are not looked at."""
-    blank = is_blank(scan.contrast)
-    repeated = repeats(scan.change) & ~blank
-    counted = "; frame numbers count the others"
-    if blank.any():
-        numbers, word = np.flatnonzero(blank), "is" if blank.sum() == 1 else "are"
-        yield f"picture {listed(numbers)} {word} black, blank or faded and left out{counted}"
-    if repeated.any():
-        numbers, total = np.flatnonzero(repeated), len(repeated)
-        kept = total - len(numbers)
-        often = f", each is there {round(total / kept)} times" if total % kept == 0 else ""
-        yield (
-            f"{len(numbers)} of {total} pictures repeat the one before{often} "
-            f"({listed(numbers)}): left out{counted}"
         )
 
 

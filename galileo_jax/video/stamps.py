@@ -11,12 +11,9 @@ differ by shortly before and shortly after it; a motion that begins or ends chan
 LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
 """So many, and this share of the pictures in which something moves: fewer are chance, such as the
 turn of a swing. 24 pictures a second stored as 30 repeat one in five."""
-LEAST_CHANGE_GREY = 4.0
-"""Of a block of pixels; less is noise."""
-FADED = 0.5
-"""Of the usual contrast: paler pictures at the beginning and the end belong to a fade."""
-AS_DECLARED = 0.02
-"""A declared rate that is so near the film's confirms the film's own times."""
+LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
+FADED = 0.5  # of the usual contrast: paler pictures at the beginning and the end belong to a fade
+AS_DECLARED = 0.02  # A declared rate that is so near the film's confirms the film's own times
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from galileo_jax.tracking.alignment import FINE_PX, align, covariance_of
+from galileo_jax.tracking.features import rigid_motion
 from galileo_jax.tracking.noise import (
     AFTER_BLOW_SCALE2,
     BLOW_KNOWN_TO,
@@ -20,8 +22,6 @@ from galileo_jax.tracking.noise import (
 )
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import FINE_PX, align, covariance_of
-from galileo_jax.tracking.rigid import rigid_motion
 from galileo_jax.tracking.template import Outline, grey, template_at
 from tests.tracking.moving_box import Box, film
 

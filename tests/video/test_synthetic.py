@@ -15,7 +15,7 @@ from galileo_jax.video.synthetic import (
     render_clip,
     render_frames,
 )
-from galileo_jax.video.synthetic.camera import project
+from galileo_jax.video.synthetic.filming import project
 
 pytestmark = pytest.mark.video
 

@@ -31,8 +31,7 @@ TIPS_OVER = "tips over onto another face"
 FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
 RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
 
-Half = tuple[float, float]
-"""Of an object's length along the travel and of its height, m."""
+Half = tuple[float, float]  # of an object's length along the travel and of its height, m
 
 
 def ramp_end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:

@@ -6,8 +6,7 @@ from galileo_jax.observation.observation import Observation, PointPath, stretche
 
 STILL_S, FEWEST = 0.3, 9
 STILL, CLEAR = 1e-3, 5.0
-REST_S = 0.25
-"""At rest for the last so long; that a motion ends belongs to it for as long."""
+REST_S = 0.25  # at rest for the last so long; that a motion ends belongs to it for as long
 NEAR_END = 0.05  # of a radius: whoever stays so near to where it ends is at rest
 ENOUGH = 3  # places that tell a speed
 STILL_SD = 6.0  # of the errors: what is farther from where it ends has not ended

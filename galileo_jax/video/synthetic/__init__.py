@@ -5,8 +5,7 @@ from. What the camera is (`Camera`), what is in the picture (`Body`, `Ramp`) and
 is filmed (`Filming`: noise, flicker, motion blur, a hand, faults) are told apart.
 """
 
-from galileo_jax.video.synthetic.camera import Camera
-from galileo_jax.video.synthetic.filming import Filming, Hand
+from galileo_jax.video.synthetic.filming import Camera, Filming, Hand
 from galileo_jax.video.synthetic.render import Motion, Ramp, render_clip, render_frames
 from galileo_jax.video.synthetic.textures import Body
 

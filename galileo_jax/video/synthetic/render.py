@@ -14,8 +14,7 @@ import cv2
 import numpy as np
 
 from galileo_jax.runtime.atomic_write import replacing
-from galileo_jax.video.synthetic.camera import Camera, project
-from galileo_jax.video.synthetic.filming import Filming, Hand
+from galileo_jax.video.synthetic.filming import Camera, Filming, Hand, project
 from galileo_jax.video.synthetic.textures import Body, body_texture, hand_texture, wall, wood
 
 SUPERSAMPLING = 3
@@ -75,12 +74,6 @@ class Layer:
         view = picture[self.window]
         view *= 1 - self.opacity[..., None]
         view += self.colour
-
-    def on_frame(self, size_px: tuple[int, int]) -> np.ndarray:
-        """Returns the opacity on the whole frame, `[height, width]`."""
-        whole = np.zeros(size_px[::-1], np.float32)
-        whole[self.window] = self.opacity
-        return whole
 
 
 @dataclass(frozen=True)
@@ -167,26 +160,18 @@ def render_frames(
             continue
         instants = _instants(motion, camera, filming, index / filming.fps)
         poses = [motion.at(instant) for instant in instants]
-        layers = [
-            _layer(
-                texture,
-                [
-                    _pose(position[body], pitch[body])
-                    @ _texels_to_metres(texture, texels_per_metre)
-                    for position, pitch in poses
-                ],
-                camera,
-            )
-            for body, texture in enumerate(textures)
-        ]
+        layers = []
+        for body, texture in enumerate(textures):
+            to_metres = _texels_to_metres(_middle(texture), texels_per_metre)
+            where = [_pose(position[body], pitch[body]) @ to_metres for position, pitch in poses]
+            layers.append(_layer(texture, where, camera))
         picture = backdrop.copy()
-        for layer in layers:
-            if layer:
-                layer.over(picture)
+        for layer in filter(None, layers):
+            layer.over(picture)
         covered = (0.0,) * len(bodies)
         if filming.hand and hand:
             held_m = motion.position_m[0, :, 0]
-            to_metres = _hand_texels_to_metres(hand[1], texels_per_metre)
+            to_metres = _texels_to_metres(hand[1], texels_per_metre)
             where = [_hand_pose(filming.hand, held_m, t) @ to_metres for t in instants]
             if hand_layer := _layer(hand[0], where, camera):
                 covered = tuple(_covered(layer, hand_layer, camera.size_px) for layer in layers)
@@ -281,29 +266,21 @@ def _layer(texture: np.ndarray, to_metres: list[np.ndarray], camera: Camera) -> 
 
 def _to_fine(left: int, top: int) -> np.ndarray:
     """From pixels to the finer grid of a window; middles of pixels are whole in both."""
-    shift = (SUPERSAMPLING - 1) / 2
-    return np.array(
-        [
-            [SUPERSAMPLING, 0, shift - SUPERSAMPLING * left],
-            [0, SUPERSAMPLING, shift - SUPERSAMPLING * top],
-            [0, 0, 1],
-        ]
-    )
+    fine, shift = SUPERSAMPLING, (SUPERSAMPLING - 1) / 2
+    return np.array([[fine, 0, shift - fine * left], [0, fine, shift - fine * top], [0, 0, 1]])
 
 
-def _texels_to_metres(texture: np.ndarray, texels_per_metre: float) -> np.ndarray:
-    """From texels to metres about the texture's middle, y up."""
+def _middle(texture: np.ndarray) -> tuple[float, float]:
     height, width = texture.shape[:2]
-    return _scaled_about(((width - 1) / 2, (height - 1) / 2), texels_per_metre)
+    return (width - 1) / 2, (height - 1) / 2
 
 
-def _hand_texels_to_metres(tips: np.ndarray, texels_per_metre: float) -> np.ndarray:
-    return _scaled_about((tips[0], tips[1]), texels_per_metre)
-
-
-def _scaled_about(texel: tuple[float, float], texels_per_metre: float) -> np.ndarray:
-    scale = 1 / texels_per_metre
-    return np.array([[scale, 0, -texel[0] * scale], [0, -scale, texel[1] * scale], [0, 0, 1]])
+def _texels_to_metres(
+    about: tuple[float, float] | np.ndarray, texels_per_metre: float
+) -> np.ndarray:
+    """From texels to metres about one of them, y up."""
+    (x, y), scale = about, 1 / texels_per_metre
+    return np.array([[scale, 0, -x * scale], [0, -scale, y * scale], [0, 0, 1]])
 
 
 def _pose(position_m: np.ndarray, pitch_rad: float) -> np.ndarray:
@@ -318,7 +295,10 @@ def _hand_pose(hand: Hand, held_m: np.ndarray, time_s: float) -> np.ndarray:
 
 
 def _covered(layer: Layer | None, hand: Layer, size_px: tuple[int, int]) -> float:
+    """The share of a layer that a hand hides."""
     if layer is None:
         return 0.0
-    hidden = layer.opacity * hand.on_frame(size_px)[layer.window]
+    whole = np.zeros(size_px[::-1], np.float32)
+    whole[hand.window] = hand.opacity
+    hidden = layer.opacity * whole[layer.window]
     return float(hidden.sum() / max(float(layer.opacity.sum()), 1e-9))

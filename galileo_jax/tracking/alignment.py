@@ -32,15 +32,12 @@ error small; coarse: reaches 5 px and 10 degrees."""
 TURNLESS = 0.02
 """A disc without texture looks the same however it is turned. An object whose gradients tell the
 angle less than this share of what they could is taken as one: its angle is not followed."""
-NUM_RIGID = 5
-"""Rows of the Jacobian without those of a stretched patch."""
+NUM_RIGID = 5  # rows of the Jacobian without those of a stretched patch
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
 """How much a patch may be stretched (one standard deviation), against noise, grey
 levels, of a pixel whose neighbours have the same."""
-COVERED = 4.0
-"""A pixel that differs by more noise sigmas shows something else than the object."""
-NEIGHBOURS = (0.1, 0.9)
-"""Bounds of what neighbouring pixels' noise is believed to correlate by."""
+COVERED = 4.0  # A pixel that differs by more noise sigmas shows something else than the object
+NEIGHBOURS = (0.1, 0.9)  # bounds of what neighbouring pixels' noise is believed to correlate by
 SETTLED_PX, SETTLED_RAD = 0.01, 3e-4
 """A turn that moves the rim of a 30 px object by 0.005 px; smaller steps change nothing."""
 
