@@ -38,9 +38,16 @@ def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]
     missing = UNMEASURED_SD_M**2 - np.einsum("oat,oabt,obt->ot", across, covariance, across)
     covariance += np.einsum("ot,oat,obt->oabt", missing, across, across)
     modes, turned = observation.modes_m, observation.turned_rad
+    # Of groups the mean, of single rows their own.
+    counts = np.where((weights != 0).sum(axis=1) > 1, size, 1)
     averaged = replace(
         observation,
-        times_s=_mean_times(observation.times_s, kept, size, weights),
+        times_s=np.array(
+            [
+                observation.times_s[first : first + count].mean()
+                for first, count in zip(kept, counts, strict=True)
+            ]
+        ),
         position_m=np.where(mask[:, None], position, np.nan),
         covariance_m2=covariance,
         mask=mask,
@@ -54,37 +61,21 @@ def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]
     ]
 
 
-def _mean_times(
-    times_s: np.ndarray, kept: np.ndarray, size: int, weights: np.ndarray
-) -> Float[np.ndarray, " row"]:
-    """Of groups the mean, of single rows their own."""
-    is_group = (weights != 0).sum(axis=1) > 1
-    return np.array(
-        [
-            times_s[first : first + size].mean() if group else times_s[first]
-            for first, group in zip(kept, is_group, strict=True)
-        ]
-    )
-
-
 def _weights(
     observation: Observation, size: int
 ) -> tuple[Float[np.ndarray, "row frame"], np.ndarray]:
     """What each new row takes of each frame, and the first frame of each."""
     count = len(observation.times_s)
-    found: list[tuple[int, slice, np.ndarray]] = []
+    single, rows = np.eye(count), []
     for first in range(0, count, size):
         group = slice(first, min(first + size, count))
         around = slice(max(first - size, 0), min(first + 2 * size, count))
         own = _of_group(observation, group, around)
         if own is None:
-            found += [(i, slice(i, i + 1), np.ones(1)) for i in range(group.start, group.stop)]
+            rows += [(i, single[i]) for i in range(group.start, group.stop)]
         else:
-            found.append((first, around, own))
-    weights = np.zeros((len(found), count))
-    for row, (_, where, own) in enumerate(found):
-        weights[row, where] = own
-    return weights, np.array([first for first, *_ in found])
+            rows.append((first, np.pad(own, (around.start, count - around.stop))))
+    return np.array([row for _, row in rows]), np.array([first for first, _ in rows])
 
 
 def _of_group(observation: Observation, group: slice, around: slice) -> np.ndarray | None:

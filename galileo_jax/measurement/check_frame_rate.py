@@ -40,17 +40,11 @@ LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
 
 
 class ApparentGravity(NamedTuple):
-    """What gravity would be by the path, m/s^2.
+    """What gravity would be by the path, m/s^2."""
 
-    Attributes:
-      value: the estimate.
-      is_least: whether it can only be more: friction is not known.
-      sd: its standard deviation; 0 where it is not known.
-    """
-
-    value: float
-    is_least: bool = False
-    sd: float = 0.0
+    value: float  # the estimate
+    is_least: bool = False  # whether it can only be more: friction is not known
+    sd: float = 0.0  # its standard deviation; 0 where it is not known
 
 
 def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:

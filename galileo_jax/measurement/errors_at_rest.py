@@ -54,11 +54,7 @@ Kinds = Float[np.ndarray, " kind"]
 
 
 def with_errors_at_rest(observation: Observation) -> Observation:
-    """The observation with the covariance of what rests, in `modes_m` what frames share of it.
-
-    Args:
-      observation: of a video that was tracked, with the tracker's stated covariance.
-    """
+    """The observation with the covariance of what rests, in `modes_m` what frames share of it."""
     looks = [_look(observation, i) for i in range(len(observation.mask))]
     scatter = np.concatenate([own for _, own in looks])
     if not scatter.size:
@@ -110,10 +106,8 @@ def _shifts(
 def _look(observation: Observation, i: int) -> tuple[list[slice], Float[np.ndarray, " window"]]:
     """When object `i` rests, and in each axis of each window in which it does its scatter.
 
-    Without the first frames of each rest that follows a motion: there it comes to rest.
-
-    Returns:
-      the rests; sums of squares about the window's mean in units of the stated variance.
+    The scatter is the sum of squares about the window's mean in units of the stated variance. Of
+    rests that follow a motion without the first frames: there it comes to rest.
     """
     mask, windows = observation.mask[i], np.lib.stride_tricks.sliding_window_view
     if len(mask) < WINDOW:
@@ -135,11 +129,8 @@ def _errors(
 ) -> tuple[float, Float[np.ndarray, "row row"]]:
     """The variance of independent errors and the covariance of others, over the stated ones.
 
-    Args:
-      place_m: a coordinate of the whole clip.
-      sd_m: stated, in the frames of the rest.
-      rest: its frames.
-      usual: the variance of what rests in this clip over the stated one.
+    Of a coordinate of the whole clip, of which `sd_m` and `rest` are of one rest; `usual` is the
+    variance of what rests in this clip over the stated one.
     """
     first = rest.start + (BESIDE if rest.start else 0)
     after = rest.stop - (BESIDE if rest.stop < len(place_m) else 0)

@@ -43,9 +43,8 @@ from galileo_jax.tracking.motion_compensation import LASTS_FRAMES
 from galileo_jax.tracking.track import Track
 
 NOISE_KNOWN_TO = 0.15
-"""Beyond chance, the logarithm of the mean square of errors over stated errors differed from one
-stretch of a path to the next by 0.18, 0.19, 0.10 and 0.10 (object 1 along x on the ramp and on the
-table, along y on the ramp, object 2 along x; 120 rendered clips that were looked at)."""
+"""Sd, beyond chance, of the log mean square of errors over stated ones from one stretch of a path
+to the next: 0.18, 0.19, 0.10 and 0.10 (120 rendered clips)."""
 FAINT = 0.01  # of the strongest: what is weaker among an object's patterns is left out
 NEGLIGIBLE = 0.03  # of the stated noise, everywhere: patterns that are weaker change no estimate
 LEAST_RAD = 2e-3  # as well as a picture of a puck shows how it stands
@@ -53,11 +52,7 @@ UNSEEN_RAD = 1e3  # the error of what nothing shows: it counts for nothing
 
 
 def observed(clip: Clip) -> tuple[Observation, Track | None]:
-    """The clip's track in metres, and in pixels where it is tracked here.
-
-    Raises:
-      InputError: an object cannot be followed.
-    """
+    """The clip's track in metres, and in pixels where it is tracked here, or an `InputError`."""
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
         read = read_track(clip.path, clip.track, clip, clip.fps)

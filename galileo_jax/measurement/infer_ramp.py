@@ -24,19 +24,14 @@ from galileo_jax.observation.least_squares import Line, line_through
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
-LEVEL_SD_DEG = 0.5
-"""How level a camera stands on a tripod, and how straight a lens draws: the error that the points'
-own scatter does not show."""
-MAX_SCATTER_SD_DEG = 2.0  # A path that tells its slope no better than this does not tell it
-UPPER_SHARE = 0.75
-"""Of the way down to the table; further down the object's front is on the table already."""
+LEVEL_SD_DEG = 0.5  # how level a camera stands on a tripod, and how straight a lens draws
+MAX_SCATTER_SD_DEG = 2.0  # a path that tells its slope no better does not tell it
+UPPER_SHARE = 0.75  # of the way down; further down the object's front is on the table already
 MIN_POINTS = 5  # on a line, or on either side of a bend
-MIN_BEND_DEG = 4.0  # A path that bends by less shows no foot
-BEGIN_SHARE, LEAST_BEND = 0.5, 0.01
-"""Of the way: its begin; by how many rad, at least, a valley's slope changes there."""
-SIZE_SD_M = 0.003
-"""A marked point is the centre within this, and a height or a distance of centres no better."""
-NUM_BESIDE = 3  # frames on either side of a hit through which the distance's two lines are laid
+MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
+BEGIN_SHARE, LEAST_BEND = 0.5, 0.01  # of a valley's way; by so many rad its slope changes there
+SIZE_SD_M = 0.003  # a marked point is the centre, and a height right, no better
+NUM_BESIDE = 3  # frames on either side of a hit through which the distance's lines are laid
 CLEARLY = 5.0  # standard deviations by which an object must move to have been hit
 
 
@@ -171,12 +166,7 @@ def _meeting(before: Line, after: Line) -> np.ndarray:
 
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
-    """`size_m` by name of the objects that have none.
-
-    Args:
-      clip: with its ramp's angle.
-      observation: the tracked points, which are taken for the objects' centres.
-    """
+    """`size_m` by name of the objects that have none; what is tracked is their centres."""
     from galileo_jax.model.scene.scene import extents
 
     angle = math.radians(clip.ramp_angle_deg or 0.0)

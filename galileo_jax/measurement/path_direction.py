@@ -45,10 +45,7 @@ class OtherWay:
 def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay | None:
     """What the path of object 1 says against the declared way; None where they agree.
 
-    Args:
-      clip: what is declared.
-      observation: the motion of the scene.
-      may_turn: whether its axes may be any.
+    The axes of a table `may_turn`.
     """
     scenario = SCENARIOS[clip.scenario]
     declared = clip.ramp_angle_deg if scenario.has_ramp else 90.0

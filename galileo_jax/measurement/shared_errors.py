@@ -3,12 +3,13 @@
 The csv has a covariance for each frame. Errors that many frames share (`Observation.modes_m`) and
 what is known of where the track is from stand beside it, and how far pucks were seen to turn, so
 that a comparison of a saved run has the likelihood of the fit. Where there is nothing to say there
-is no file. A bundle has the file
-beside its track, by the track's name, so that the track of a film is fitted again as the film was.
+is no file. A bundle has the file beside its track, by the track's name, so that the track of a film
+is fitted again as the film was.
 """
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +18,8 @@ from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 ERRORS = "errors.npz"
-FLAGS = ("is_squared", "num_errors")
-KNOWN_TO, TURNED = "noise_known_to", "turned_rad"
+NUMBERS = {"is_squared": bool, "num_errors": int, "noise_known_to": float}
+ARRAYS = ("modes_m", "turned_rad")  # which an observation may not have
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
@@ -39,21 +40,13 @@ def beside(track: Path) -> Path:
 
 def write_errors(path: Path, observation: Observation) -> None:
     """Writes them into a file, or removes it where there is nothing to say."""
-    is_plain = not any(getattr(observation, name) for name in (*FLAGS, KNOWN_TO))
-    modes = NOTHING if observation.modes_m is None else observation.modes_m
-    turned = NOTHING if observation.turned_rad is None else observation.turned_rad
-    if is_plain and not modes.size and not turned.size:
+    own: dict[str, Any] = {name: getattr(observation, name) for name in (*NUMBERS, *ARRAYS)}
+    own |= {name: NOTHING for name in ARRAYS if own[name] is None}
+    if not any(np.size(own[name]) for name in ARRAYS) and not any(own[name] for name in NUMBERS):
         path.unlink(missing_ok=True)
         return
     with replacing(path) as temporary:
-        np.savez_compressed(
-            temporary,
-            modes_m=modes,
-            is_squared=observation.is_squared,
-            num_errors=observation.num_errors,
-            noise_known_to=observation.noise_known_to,
-            turned_rad=turned,
-        )
+        np.savez_compressed(temporary, **own)
 
 
 def with_errors(path: Path, observation: Observation) -> Observation:
@@ -66,19 +59,13 @@ def with_errors(path: Path, observation: Observation) -> Observation:
         return observation
     try:
         with np.load(path) as file:
-            modes = file["modes_m"]
-            squared, num_errors = (int(file[name]) for name in FLAGS)
-            known_to = float(file.get(KNOWN_TO, 0.0))  # runs of earlier versions have none
-            turned = file.get(TURNED, NOTHING)
+            # Runs of earlier versions have no `noise_known_to` and no `turned_rad`.
+            own = {name: kind(file[name]) for name, kind in NUMBERS.items() if name in file}
+            modes, turned = file["modes_m"], file.get("turned_rad", NOTHING)
     except Exception as error:  # a damaged archive raises anything
         raise InputError(f"{path}: damaged, or not the errors of a track") from error
     if modes.size and modes.shape[1:] != observation.position_m.shape:
         raise InputError(f"{path}: the errors of another track; remove it")
-    return replace(
-        observation,
-        modes_m=modes if modes.size else None,
-        is_squared=bool(squared),
-        num_errors=num_errors,
-        noise_known_to=known_to,
-        turned_rad=turned if turned.size else None,
-    )
+    arrays = {"modes_m": modes, "turned_rad": turned}
+    own |= {name: values if values.size else None for name, values in arrays.items()}
+    return replace(observation, **own)

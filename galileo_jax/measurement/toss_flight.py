@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from galileo_jax.observation.least_squares import polynomial
 from galileo_jax.observation.poses import Poses
 
 NEAR_SHARE = 0.06  # of the edge: a lowest corner nearer to the plane may touch it in the next frame
@@ -34,58 +36,49 @@ class Flight:
     acceleration_m_s2: np.ndarray
 
 
-def last_free_frame(poses: Poses, size_m: Sequence[float] | None) -> int | None:
-    """The last frame before any corner is near the plane; None where none ever is.
-
-    Args:
-      poses: in the world's axes, the plane near z = 0.
-      size_m: the box's edges; None: what its lowest place says.
-    """
+def _turned(quaternion: np.ndarray) -> Any:
+    """The `Rotation` of quaternions, real part first."""
     from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
 
+    return Rotation.from_quat(quaternion, scalar_first=True)
+
+
+def last_free_frame(poses: Poses, size_m: Sequence[float] | None) -> int | None:
+    """The last frame before any corner is near the plane, about z = 0; None where none ever is.
+
+    Without the box's edges, `size_m`, its lowest place says how large it is.
+    """
     lowest = 2 * float(poses.position_m[:, 2].min())
     size = np.full(3, lowest) if size_m is None else np.asarray(size_m)
-    turned = Rotation.from_quat(poses.quaternion, scalar_first=True).as_matrix()
-    reach = np.abs(turned[:, 2]) @ (size / 2)
+    reach = np.abs(_turned(poses.quaternion).as_matrix()[:, 2]) @ (size / 2)
     near = poses.position_m[:, 2] - reach <= NEAR_SHARE * float(np.min(size))
     return max(int(np.argmax(near)) - 1, 0) if near.any() else None
 
 
 def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
-    """The flight, None where it has fewer than `FEWEST` frames.
+    """The flight above a plane near z = 0; None where it has fewer than `FEWEST` frames.
 
     The spin is that of a body that turns evenly (a cube does; other boxes nearly, so briefly).
-
-    Args:
-      poses: in the world's axes, the plane near z = 0.
-      size_m: `[3]`, the box's edges.
     """
-    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
-
-    turned = Rotation.from_quat(poses.quaternion, scalar_first=True)
+    turned = _turned(poses.quaternion)
     found = last_free_frame(poses, tuple(size_m))
     last = len(poses.times_s) - 1 if found is None else found
     if last + 1 < FEWEST:
         return None
     time = poses.times_s[: last + 1] - poses.times_s[0]
-    design = np.stack([np.ones_like(time), time, time**2 / 2], axis=1)
-    place = np.linalg.lstsq(design, poses.position_m[: last + 1])[0]
+    half_bend, velocity, place = polynomial(time, poses.position_m[: last + 1], 2).solution
     since = (turned[: last + 1] * turned[0].inv()).as_rotvec()
-    turning = np.linalg.lstsq(design[:, :2], since)[0]
-    first = Rotation.from_rotvec(turning[0]) * turned[0]
-    quaternion = first.as_quat(scalar_first=True)
-    return Flight(last, place[0], place[1], quaternion, turning[1], place[2])
+    spin, at_first = polynomial(time, since, 1).solution
+    first = type(turned).from_rotvec(at_first) * turned[0]
+    return Flight(last, place, velocity, first.as_quat(scalar_first=True), spin, 2 * half_bend)
 
 
 def resting_height_m(tosses: Sequence[Poses]) -> float | None:
     """The median height of the centre, m, over the tosses that end on a face; None: none does."""
-    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
-
     found = []
     for poses in tosses:
         place = poses.position_m[-LAST_FRAMES:]
-        turned = Rotation.from_quat(poses.quaternion[-1], scalar_first=True).as_matrix()
-        is_flat = np.abs(turned[2]).max() > FLAT
+        is_flat = np.abs(_turned(poses.quaternion[-1]).as_matrix()[2]).max() > FLAT
         if len(place) == LAST_FRAMES and is_flat and np.ptp(place, axis=0).max() < STILL_M:
             found.append(np.median(place[:, 2]))
     return float(np.median(found)) if found else None

@@ -7,11 +7,9 @@ at, and of the code that tracks. It lies with JAX's compiled programs (`GALILEO_
 import contextlib
 import functools
 import hashlib
-import io
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,15 +19,17 @@ from galileo_jax.runtime.jax_setup import cache_folder
 from galileo_jax.tracking.track import Track
 
 FOLDER = "tracks"
-ROOMS = ("clip", "tracking", "video")  # whose code decides what a track is
+ROOMS = ("clip", "observation", "tracking", "video")  # whose code decides what a track is
 LIBRARIES = ("av", "numpy", "opencv-python-headless", "scipy")
 # Of the yaml: what is declared about the picture and the objects in it.
 KEYS = {
     *("scenario", "fps", "ramp_angle_deg", "direction"),
     *("pixels_per_metre", "rectangle", "lens", "origin_px"),
 }
-OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "rolls"}
-OBJECT_KEYS |= {"first_frame", "last_frame", "corrections"}
+OBJECT_KEYS = {
+    *("name", "shape", "size_m", "point_px"),
+    *("rolls", "first_frame", "last_frame", "corrections"),
+}
 
 
 def track_once(clip: Clip) -> Track:
@@ -40,34 +40,38 @@ def track_once(clip: Clip) -> Track:
     """
     from galileo_jax.tracking.clip import track_clip  # and OpenCV: a csv track needs neither
 
-    folder = cache_folder()
-    if folder is None or clip.video is None:
+    path = _path(clip)
+    if path is None:
         return track_clip(clip)
-    path = _path(folder, clip)
     if (found := _read(path)) is not None:
         return found
     track = track_clip(clip)
     # A cache that cannot be written is no reason to stop.
     with contextlib.suppress(OSError), replacing(path) as temporary:
-        temporary.write_bytes(_packed(track))
+        np.savez(temporary, allow_pickle=False, **vars(track))
     return track
 
 
 def is_tracked(clip: Clip) -> bool:
     """Whether the clip's track is in the cache."""
+    path = _path(clip)
+    return path is not None and path.is_file()
+
+
+def _path(clip: Clip) -> Path | None:
+    """Where the clip's track is kept; None: nowhere."""
     folder = cache_folder()
-    return folder is not None and clip.video is not None and _path(folder, clip).is_file()
-
-
-def _path(folder: Path, clip: Clip) -> Path:
-    return folder / FOLDER / f"{_digest(clip)}.npz"
-
-
-def _packed(track: Track) -> bytes:
-    buffer = io.BytesIO()
-    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in vars(track).items()}
-    np.savez(buffer, **arrays)
-    return buffer.getvalue()
+    if folder is None or clip.video is None:
+        return None
+    declared = clip.model_dump(mode="json", include=KEYS)
+    declared["objects"] = [
+        item.model_dump(mode="json", include=OBJECT_KEYS) for item in clip.objects
+    ]
+    found = hashlib.sha256(json.dumps([_code(), declared], sort_keys=True).encode())
+    with clip.video.open("rb") as file:
+        while block := file.read(1 << 20):
+            found.update(block)
+    return folder / FOLDER / f"{found.hexdigest()[:40]}.npz"
 
 
 def _read(path: Path) -> Track | None:
@@ -79,19 +83,6 @@ def _read(path: Path) -> Track | None:
         return Track(names=names, frame_size_px=(width, height), **arrays)
     except Exception:  # not there, or damaged, which raises anything: it is made again
         return None
-
-
-def _digest(clip: Clip) -> str:
-    assert clip.video is not None
-    declared = clip.model_dump(mode="json", include=KEYS)
-    declared["objects"] = [
-        item.model_dump(mode="json", include=OBJECT_KEYS) for item in clip.objects
-    ]
-    found = hashlib.sha256(json.dumps([_code(), declared], sort_keys=True).encode())
-    with clip.video.open("rb") as file:
-        while block := file.read(1 << 20):
-            found.update(block)
-    return found.hexdigest()[:40]
 
 
 @functools.cache

@@ -43,34 +43,21 @@ BESIDE_HIT = 1
 def with_wander(
     observation: Observation, objects: Sequence[ClipObject] = (), walls: Sequence[Wall] = ()
 ) -> Observation:
-    """The observation with the size of its wander, `wander_m`.
-
-    Args:
-      observation: of pucks in a plane, or of one body in space; its errors as stated.
-      objects: pucks that may bounce off walls.
-      walls: in metres.
-    """
+    """The observation, of pucks or of one body in space, with its wander; walls are in metres."""
     num_axes = len([axis for axis in observation.axes if axis != "turning"])
     largest_m, lasts_s = (LARGEST_M, LASTS_S) if num_axes == 2 else (IN_SPACE_M, IN_SPACE_S)
-    sizes_m = largest_m * SIZES
-    evidence = np.zeros(len(SIZES))
-    for i, axis in product(range(len(observation.names)), range(num_axes)):
+    sizes_m, evidence = largest_m * SIZES, np.zeros(len(SIZES))
+    for i in range(len(observation.names)):
+        radius_m = (objects[i].size_m or (0.0,))[0] if walls else 0.0
+        place, mask = observation.position_m[i], observation.mask[i]
         bounced = [
-            frame
-            for wall in walls
-            for frame in bounces(
-                observation.position_m[i, :2],
-                observation.mask[i],
-                wall.ends_m,
-                (objects[i].size_m or (0.0,))[0],
-            )
+            frame for wall in walls for frame in bounces(place[:2], mask, wall.ends_m, radius_m)
         ]
-        for piece in _pieces(observation, i, bounced):
+        for piece, axis in product(_pieces(observation, i, bounced), range(num_axes)):
             if len(piece) >= LEAST_FRAMES:
                 variance = observation.covariance_m2[i, axis, axis, piece]
-                place = observation.position_m[i, axis, piece]
                 times_s = observation.times_s[piece]
-                evidence += _evidence(times_s, place, variance, sizes_m, lasts_s)
+                evidence += _evidence(times_s, place[axis, piece], variance, sizes_m, lasts_s)
     if not evidence.any():
         return replace(observation, wander_m=largest_m)
     weight = np.exp(evidence - np.asarray(logsumexp(evidence)))

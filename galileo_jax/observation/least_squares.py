@@ -10,17 +10,11 @@ from jaxtyping import Float
 
 @dataclass(frozen=True)
 class LinearFit:
-    """What `design @ solution` makes of values, `[row, ...]`.
+    """What `design @ solution` makes of values, `[row, ...]`."""
 
-    Attributes:
-      design: `[row, term]`.
-      solution: `[term, ...]`.
-      left: `[row, ...]`, values less what is fitted.
-    """
-
-    design: Float[np.ndarray, "row term"]
-    solution: np.ndarray
-    left: np.ndarray
+    design: Float[np.ndarray, "row term"]  # `[row, term]`
+    solution: np.ndarray  # `[term, ...]`
+    left: np.ndarray  # `[row, ...]`, values less what is fitted
 
     @cached_property
     def inverse(self) -> Float[np.ndarray, "term term"]:

@@ -16,6 +16,8 @@ AWAY_SD, AWAY_M = 6.0, 3e-4  # an object farther than both from where it stood h
 STANDING_FRAMES = 5  # that say where it stood
 LEAST_SD_M = 1e-6  # smaller errors do not keep their digits beside it
 
+Steps = Float[np.ndarray, " step"]
+
 
 def stretches(chosen: Bool[np.ndarray, " frame"]) -> list[slice]:
     """The runs of chosen frames that follow each other."""
@@ -44,11 +46,7 @@ class PointPath:
         return len(self.frames)
 
     @property
-    def steps(
-        self,
-    ) -> tuple[
-        Float[np.ndarray, " step"], Float[np.ndarray, "axis step"], Float[np.ndarray, " step"]
-    ]:
+    def steps(self) -> tuple[Steps, Float[np.ndarray, "axis step"], Steps]:
         """From each place to the next: the time, s, the velocity, m/s, and its sd."""
         step_s = np.diff(self.times_s)
         sd = np.sqrt(self.variance_m2[1:] + self.variance_m2[:-1]) / step_s
@@ -213,17 +211,12 @@ class Observation:
     ) -> Float[np.ndarray, "*batch object axis"]:
         """How far the points followed are from the centres: the median of measured - predicted.
 
-        Args:
-          predicted_m: centres; with fewer axes than were measured, of the first of them.
-
-        Returns:
-          0 of an object that is never seen.
+        `predicted_m` may have the first axes only. 0 of an object that is never seen.
         """
         left = self.position_m[:, : predicted_m.shape[-2]] - predicted_m
         found = np.zeros(left.shape[:-1])
-        for i, seen in enumerate(self.mask):
-            if seen.any():
-                found[..., i, :] = np.median(left[..., i, :, seen], axis=0)
+        for i in np.flatnonzero(self.mask.any(axis=1)):
+            found[..., i, :] = np.median(left[..., i, :, self.mask[i]], axis=0)
         return found
 
     @property

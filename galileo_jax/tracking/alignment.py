@@ -30,39 +30,29 @@ error small; coarse: reaches 5 px and 10 degrees."""
 
 
 TURNLESS = 0.02
-"""A disc without texture looks the same however it is turned. An object whose gradients tell the
-angle less than this share of what they could is taken as one: its angle is not followed."""
+"""An object whose gradients tell the angle less than this share of what they could looks the same
+however it is turned: its angle is not followed."""
 NUM_RIGID = 5  # rows of the Jacobian without those of a stretched patch
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
-"""How much a patch may be stretched (one standard deviation), against noise, grey
-levels, of a pixel whose neighbours have the same."""
-COVERED = 4.0  # A pixel that differs by more noise sigmas shows something else than the object
+"""How much a patch may be stretched (sd), against noise, grey levels, of a pixel whose neighbours
+have the same."""
+COVERED = 4.0  # noise sigmas: a pixel that differs by more shows something else than the object
 NEIGHBOURS = (0.1, 0.9)  # bounds of what neighbouring pixels' noise is believed to correlate by
 SETTLED_PX, SETTLED_RAD = 0.01, 3e-4
-"""A turn that moves the rim of a 30 px object by 0.005 px; smaller steps change nothing."""
+"""0.005 px at the rim of a 30 px object; smaller steps change nothing."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A pose and how well the template fits there.
+    """A pose and how well the template fits there."""
 
-    Attributes:
-      pose: `(x, y, angle)`.
-      correlation: weighted correlation of patch and template, 1 is perfect.
-      noise: robust standard deviation of the residual, grey levels of the smoothed patch.
-      covered: share of the region that differs by more than `COVERED` noise sigmas.
-      gain: the patch's contrast against the template's.
-      weight: `[pixel]`, what each pixel of the region counted.
-      residual: `[pixel]`, patch minus fitted template.
-    """
-
-    pose: np.ndarray
-    correlation: float
-    noise: float
-    covered: float
-    gain: float
-    weight: np.ndarray
-    residual: np.ndarray
+    pose: np.ndarray  # `(x, y, angle)`
+    correlation: float  # weighted correlation of patch and template, 1 is perfect
+    noise: float  # robust standard deviation of the residual, grey levels of the smoothed patch
+    covered: float  # share of the region that differs by more than `COVERED` noise sigmas
+    gain: float  # the patch's contrast against the template's
+    weight: np.ndarray  # `[pixel]`, what each pixel of the region counted
+    residual: np.ndarray  # `[pixel]`, patch minus fitted template
 
 
 class Target:

@@ -22,7 +22,7 @@ from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
 WINDOW_PX = 13
-MOVED_PX = 3.0  # A feature that is this far from where it began has moved; noise reaches 1 px
+MOVED_PX = 3.0  # a feature that is this far from where it began has moved; noise reaches 1 px
 SAME_ONSET_FRAMES = 3
 SAME_WAY_PX = 3.0  # features of one thing are displaced alike to this, while they turn little
 NEARER = 0.05  # of a size in the picture: it may change by this, as the thing comes nearer
@@ -36,25 +36,16 @@ LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked 
 
 @dataclass(frozen=True)
 class Mover:
-    """A thing that moves.
+    """A thing that moves."""
 
-    Attributes:
-      point_px: middle of its features in the first frame in which it is seen, `(x, y)`.
-      onset_frame: when it had moved by `MOVED_PX`.
-      num_features: how many features agree on it; 0 of a silhouette.
-      leaves_picture: whether its features were last seen going over the border.
-      places_px: `[feature, 2]`, the features in that frame; of a silhouette two corners.
-      goes_right: whether its features were last seen to the right of where they began.
-      first_frame: in which it is seen.
-    """
-
+    # middle of its features in the first frame in which it is seen, `(x, y)`
     point_px: tuple[float, float]
-    onset_frame: int
-    num_features: int
-    leaves_picture: bool
-    places_px: np.ndarray
-    goes_right: bool = True
-    first_frame: int = 0
+    onset_frame: int  # when it had moved by `MOVED_PX`
+    num_features: int  # how many features agree on it; 0 of a silhouette
+    leaves_picture: bool  # whether its features were last seen going over the border
+    places_px: np.ndarray  # `[feature, 2]`, the features in that frame; of a silhouette two corners
+    goes_right: bool = True  # whether its features were last seen to the right of where they began
+    first_frame: int = 0  # in which it is seen
 
 
 class CameraMovesError(InputError):
@@ -71,11 +62,9 @@ def find_movers(
     """The things that move, those that stay in the picture first, each kind by onset.
 
     Args:
-      open_frames: gives the frames from the beginning; called once, or three times where no
-        features move.
+      open_frames: gives the frames; called once, or three times where no features move.
       span_px: about the size of an object; features farther apart are linked by others only.
-      axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle); their
-        middle is taken along these axes.
+      axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
       advance: called after every frame.
 
     Raises:

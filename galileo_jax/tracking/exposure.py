@@ -8,14 +8,12 @@ from galileo_jax.tracking.pose import length, own_motion
 from galileo_jax.tracking.template import Template
 
 SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
-MIN_SPEED_PX = 3.0  # slower than this per frame, the smear is too short to measure
-UNLEARNT = (0.0, 0.25, 0.5)
-"""Shares that are tried one after the other while fewer than `LEARNT_FRAMES` frames count."""
+MIN_SPEED_PX = 3.0  # per frame; slower, the smear is too short to measure
+UNLEARNT = (0.0, 0.25, 0.5)  # shares that are tried while fewer than `LEARNT_FRAMES` frames count
 LEARNT_FRAMES = 3
 SAME_MOTION_PX = 0.3  # motions during the exposure that differ by less are not tried separately
 ENOUGH_PX2 = 15e3
-"""After moving frames whose speeds' squares add up to this, the share is known to some percent;
-more would only take time. A slow object needs more frames than a fast one."""
+"""After moving frames whose speeds' squares add up to this, the share is known to some percent."""
 
 
 def distinct(motions: list[np.ndarray], radius: int) -> list[np.ndarray]:

@@ -21,38 +21,31 @@ from galileo_jax.tracking.redetect import (
 from galileo_jax.tracking.template import Template, median_template
 
 FOUND, FOUND_AGAIN = 0.75, 0.85
-"""Least correlation with the template for an object to count as found: near where it was
-expected, or by a wide search."""
-REACH_SHARE = 0.2
-"""Share of the frame's width searched to each side of where an object was lost: a thrown ball
-moves that far within a frame."""
-WORSE = 0.1  # A fit that correlates this much less than the one before is worth a wide search
+"""Least correlation with the template to count as found: near where expected, by a wide search."""
+REACH_SHARE = 0.2  # of the frame's width is searched to each side of where an object was lost
+WORSE = 0.1  # a fit that correlates this much less than the one before is worth a wide search
 AS_EXPECTED_PX, AS_SEEN = 1.0, 0.02
-"""An object that is this close to where it should be, and correlates by no more than this less than
-in the frame before, is not looked for by its features."""
+"""What is this close to where it should be, and correlates by no more than this less than in the
+frame before, is not looked for by its features."""
 MAX_TURN_RAD = 0.7  # an object does not turn further between two frames in which it is seen
 SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
 """After so many frames an object's velocity is known: it can then be no farther from where it
 should be than a blow throws it, in each of so many frames of being hidden."""
-MAX_COAST_FRAMES = 8
-"""A hidden object is expected to have gone on for so many frames, and then to have stopped."""
+MAX_COAST_FRAMES = 8  # for which a hidden object goes on as it did, before it has stopped
 LONG_GONE_FRAMES, LOOK_EVERY = 16, 4
-"""An object missed for longer is looked for only in every so many frames."""
+"""What is missed for longer is looked for in every so many frames."""
 HELD_SPEED_PX, HELD_SHARE = 1.0, 0.1
 """What moved faster than this per frame and is now shown within this share of a step from where it
 was has stopped at once, or the video repeats a frame; the next frame tells."""
 AS_BEFORE = 0.3
-"""Share of its path since by which what goes on after a repeated frame is off a steady motion."""
-PATCH_PX = 1.0
-"""An object that moves less than this during the exposure gives a patch for the template."""
+"""Of its path since, by which what goes on after a repeated frame is off a steady motion."""
+PATCH_PX = 1.0  # what moves less during the exposure gives a patch for the template
 CLICKED_PX, CLICKED_SHARE = 4.0, 0.5
-"""How far from its centre, or at which share of its template's radius, one may click on it."""
+"""From its centre, or of its template's radius: where one may click on it."""
 MAX_PATCHES = 32
-KNOWN_FROM = 2
-"""Before this frame, counted from 0, nobody knows whether an object moved in its first."""
+KNOWN_FROM = 2  # before this frame, from 0, nobody knows whether an object moved in its first
 HIT_GAIN = 2.0  # what is hit by something heavy, elastically, flies off with twice its speed
-SAME_PLACE = 0.5
-"""Centres that are within this share of the smaller one's size: two objects are not there."""
+SAME_PLACE = 0.5  # of the smaller one's size: two objects are never so near
 RENEWALS = frozenset(8 * 2**i for i in range(32))
 """Numbers of sharp frames after which the template becomes the median of the patches so far:
 without noise, without the hand, and in time without what was behind the object."""
@@ -60,44 +53,31 @@ without noise, without the hand, and in time without what was behind the object.
 
 @dataclass
 class Follower:
-    """Follows one object from frame to frame; `poses` grows by one entry per frame.
+    """Follows one object from frame to frame; `poses` grows by one entry per frame."""
 
-    Attributes:
-      template: from the first frame at first, hand and noise included.
-      pose: the last one found.
-      exposure: of the video, shared by all objects.
-      first_picture: the frame in which it began: the scene without it, elsewhere.
-      velocity: change of the pose per usual step, extrapolated to the last one.
-      mean_velocity: over the step to the last one.
-      poses: pose of every frame so far, NaN where not found.
-      patches: sharp aligned patches, thinned evenly to at most `MAX_PATCHES`.
-      since: the last frame that showed where it is, in usual steps.
-      off_course_px: how far from where it should have been it was found last.
-      frames_before: that somebody has put it right in.
-      fastest_px: of the other objects, per frame.
-      is_alone: there is nothing that could strike it.
-      taken: places where other objects are in this frame.
-    """
-
-    template: Template
-    pose: np.ndarray
-    exposure: Exposure
-    first_picture: Picture
+    template: Template  # from the first frame at first, hand and noise included
+    pose: np.ndarray  # the last one found
+    exposure: Exposure  # of the video, shared by all objects
+    first_picture: Picture  # the frame in which it began: the scene without it, elsewhere
+    # change of the pose per usual step, extrapolated to the last one
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # over the step to the last one
     mean_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # pose of every frame so far, NaN where not found
     poses: list[np.ndarray] = field(default_factory=list)
+    # sharp aligned patches, thinned evenly to at most `MAX_PATCHES`
     patches: list[np.ndarray] = field(default_factory=list)
     correlation: float = 1.0
     frames_missed: int = 0
     frames_held: int = 0
-    since: float = 0.0
-    off_course_px: float = 0.0
+    since: float = 0.0  # the last frame that showed where it is, in usual steps
+    off_course_px: float = 0.0  # how far from where it should have been it was found last
     stride: int = 1
     frames_sharp: int = 0
-    frames_before: int = 0
-    fastest_px: float = 0.0
-    is_alone: bool = True
-    taken: tuple[np.ndarray, ...] = ()
+    frames_before: int = 0  # that somebody has put it right in
+    fastest_px: float = 0.0  # of the other objects, per frame
+    is_alone: bool = True  # there is nothing that could strike it
+    taken: tuple[np.ndarray, ...] = ()  # places where other objects are in this frame
 
     def __post_init__(self) -> None:
         self.first_pose = self.pose
@@ -122,13 +102,7 @@ class Follower:
         self.taken = ()
 
     def step(self, before: Picture | None, picture: Picture, step: float = 1.0) -> None:
-        """Finds the object in the next frame.
-
-        Args:
-          before: the frame preceding it.
-          picture: the frame.
-          step: the time between them, in usual steps.
-        """
+        """Finds the object in the next frame, `step` usual steps after the frame `before`."""
         self._step = step
         lists = {"poses": [*self.poses], "patches": [*self.patches]}
         self._last = {k: v for k, v in vars(self).items() if k != "_last"} | lists
@@ -183,7 +157,7 @@ class Follower:
         mean, velocity, is_blow = self._velocity_to(fit.pose)
         is_smooth = not self.frames_missed and not is_blow
         if not is_first:
-            # What is alone is never struck: it is smeared now as it was first, and its template
+            # what is alone is never struck: it is smeared now as it was first, and its template
             # is renewed from what it looks like on its way.
             if len(self.poses) == KNOWN_FROM and not self.frames_before and not self.is_alone:
                 self._see_how_it_began(fit.pose)

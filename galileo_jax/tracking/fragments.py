@@ -16,23 +16,14 @@ from galileo_jax.tracking.template import Outline, template_at
 
 @dataclass(frozen=True)
 class Start:
-    """Where an object is first seen.
+    """Where an object is first seen."""
 
-    Attributes:
-      name: the object's.
-      point_px: `(x, y)` of the point to follow, in frame `first_frame`.
-      outline: what the object fills around the point.
-      first_frame: frames before are not looked at.
-      last_frame: nor are frames after; None: to the end.
-      corrections: where somebody has seen it in later frames, in time's order: it is followed on
-        from there.
-    """
-
-    name: str
-    point_px: tuple[float, float]
-    outline: Outline
-    first_frame: int = 0
-    last_frame: int | None = None
+    name: str  # the object's
+    point_px: tuple[float, float]  # `(x, y)` of the point to follow, in frame `first_frame`
+    outline: Outline  # what the object fills around the point
+    first_frame: int = 0  # frames before are not looked at
+    last_frame: int | None = None  # nor are frames after; None: to the end
+    # where somebody has seen it in later frames, in time's order: it is followed on from there
     corrections: "tuple[Start, ...]" = ()
 
     def uses(self, index: int) -> bool:
@@ -42,21 +33,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Piece:
-    """One look of an object.
+    """One look of an object."""
 
-    Attributes:
-      first_frame: in which it begins.
-      point_px: the followed point there.
-      follower: with its poses from that frame on.
-      corrected: frames in which somebody has put it right.
-      turned_rad: how far the object had turned when the piece began.
-    """
-
-    first_frame: int
-    point_px: tuple[float, float]
-    follower: Follower
-    corrected: tuple[int, ...] = ()
-    turned_rad: float = 0.0
+    first_frame: int  # in which it begins
+    point_px: tuple[float, float]  # the followed point there
+    follower: Follower  # with its poses from that frame on
+    corrected: tuple[int, ...] = ()  # frames in which somebody has put it right
+    turned_rad: float = 0.0  # how far the object had turned when the piece began
 
     @property
     def is_clicked(self) -> bool:
@@ -87,17 +70,10 @@ def follow_on(
     beside: Sequence[Follower],
     step: float,
 ) -> None:
-    """One frame further; `pieces` grows where a new one begins.
+    """One frame further; `pieces`, the object's so far, grows where a new one begins.
 
-    Args:
-      pieces: the object's so far.
-      start: the object.
-      index: of the frame.
-      before: the frame before it.
-      picture: the frame.
-      exposure: of the video, shared by all objects.
-      beside: the other objects, which may hit it.
-      step: time since the frame before, in usual steps.
+    `beside` are the other objects, which may hit it; `step` is the time since the frame `before`,
+    in usual steps.
     """
     if not pieces:
         pieces.append(_begun(start, picture, exposure))
@@ -118,14 +94,7 @@ def follow_on(
 def keep_apart(
     pieces: Sequence[Piece], index: int, before: Picture | None, picture: Picture
 ) -> None:
-    """Two objects cannot be at one place: the one that is less expected there is sought elsewhere.
-
-    Args:
-      pieces: of all objects, one frame further.
-      index: of the frame.
-      before: the frame before it.
-      picture: the frame.
-    """
+    """Of two objects at one place the one that is less expected there is sought elsewhere."""
     for one, other in combinations([piece for piece in pieces if index > piece.first_frame], 2):
         pair = [one.follower, other.follower]
         # NaN compares False: what is not found is nowhere.

@@ -35,57 +35,48 @@ from galileo_jax.tracking.noise import has_moved
 
 STEPS_PER_PX = np.array([1.0, 2.0, 4.0])
 USUAL_PX = np.array([0.006, 0.03, 0.03])
-"""Prior standard deviations of a video's amplitudes: those of rendered MPEG-4 were -0.006 px (whole
-pixels) and -0.03 px (half pixels), those of H.264 and H.265 -0.02 px (quarter pixels)."""
+"""Prior sds of a video's amplitudes: rendered MPEG-4 had -0.006 px (whole pixels) and -0.03 px
+(half pixels), H.264 and H.265 -0.02 px (quarter pixels)."""
 OWN_PX = np.array([0.003, 0.01, 0.004])
-"""Standard deviations of an object's own about those: half pixels, object 1 along x and y, object 2
-along x: -0.026, -0.023, -0.033 px (60 rendered clips that were looked at)."""
-OWN_NOISE_VALUES = 5.0
-"""An object's noise weighs against so many values with the noise of the whole video."""
+"""Sds of an object's own about those (half pixels: -0.026, -0.023, -0.033 px; 60 rendered
+clips)."""
+OWN_NOISE_VALUES = 5.0  # that an object's noise weighs against with the noise of the whole video
 PIECE_FRAMES, DEGREE = 8, 2
 MIN_PIECES = 3  # fewer pieces tell no amplitude
-ROUGH = 6.0  # A piece with so many times the usual mean square is left out: something was hit in it
+ROUGH = 6.0  # a piece with so many times the usual mean square is left out: something was hit in it
 MOST_ALIKE = 0.8
 """If displacements agree so well in where they lie between two half pixels (length of the mean
 phasor), a piece tells nothing."""
 SLOPE_MOST = 0.9  # of e': beyond 1, two places of the object would give the same picture
 VARIES_PX, VARIES_SHARE = 0.005, 0.3
-"""By how much an amplitude differs from what was found, now more, now less: standard deviation, but
-never more than this share of the amplitude. With it the errors of what moves in 120 rendered clips
-(241 stretches, looked at) are more probable by 54 nats; it lasts about `LASTS_FRAMES`."""
+"""By how much an amplitude differs from what was found, now more, now less, for `LASTS_FRAMES`: sd,
+at most this share of the amplitude (more probable by 54 nats in 120 rendered clips)."""
 LASTS_FRAMES = 10.0
 LEAST_VOLUME = 1e-3
 SHARE_LEFT = 1 - (DEGREE + 1) / PIECE_FRAMES  # of a piece's values, what a parabola leaves
 FASTEST_PX = 32.0
 """From a frame to the next: amplitudes were -0.027 px up to 16 px, -0.02 px to 32 px and 0 beyond
-(object 1 in 60 rendered clips that were looked at); so far a coder finds no block again."""
+(60 rendered clips); so far a coder finds no block again."""
 TURNS_RAD = 0.01  # from a frame to the next: a third of a pixel at the rim of a middling object
 
 
 @dataclass(frozen=True)
 class Coding:
-    """How the frames that are tracked were coded.
+    """How the frames that are tracked were coded."""
 
-    Attributes:
-      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them.
-      to_coded: pixels of the frames that are tracked, `[*, 2]`, to those that were coded.
-      from_coded: the way back.
-    """
-
+    # `[frame]`, which frames a coder has predicted from the frame before them
     is_predicted: Bool[np.ndarray, " frame"]
+    # pixels of the frames that are tracked, `[*, 2]`, to those that were coded
     to_coded: Callable[[np.ndarray], np.ndarray] = np.asarray
-    from_coded: Callable[[np.ndarray], np.ndarray] = np.asarray
+    from_coded: Callable[[np.ndarray], np.ndarray] = np.asarray  # the way back
 
 
 class Mended(NamedTuple):
-    """An object's poses without what motion compensation shifts them.
+    """An object's poses without what motion compensation shifts them."""
 
-    Attributes:
-      poses: `[frame, 3]`, x and y in px, angle in rad; NaN where not visible.
-      shifts_px: `[frame, pattern, 2]`, what is uncertain in it; see `tracking.track.Track`.
-    """
-
+    # `[frame, 3]`, x and y in px, angle in rad; NaN where not visible
     poses: Float[np.ndarray, "frame 3"]
+    # `[frame, pattern, 2]`, what is uncertain in it; see `tracking.track.Track`
     shifts_px: Float[np.ndarray, "frame pattern 2"]
 
 
@@ -96,18 +87,16 @@ def without_coding_shift(
 ) -> list[Mended]:
     """The poses of all objects without what motion compensation shifts them.
 
-    Args:
-      paths: per object the poses as the frames show them (x and y in px, angle in rad) and
-        `covariance` of image noise, px^2; NaN where not visible.
-      coding: of as many frames or more.
-      clock: when each frame was taken, in usual steps.
+    `paths` has per object the poses as the frames show them (x and y in px, angle in rad) and the
+    covariance of image noise, px^2, NaN where not visible; `clock` when each frame was taken, in
+    usual steps.
     """
     shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]
     amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted, clock)
     found = []
     for (poses, _), (coded, covariance), own_px in zip(paths, shown, amplitudes_px, strict=True):
-        # What does not move is shown where it was, and noise in its steps would only add noise.
-        # What turns no shifted block predicts, so that it is coded anew.
+        # what does not move is shown where it was, and noise in its steps would only add noise.
+        # what turns no shifted block predicts, so that it is coded anew.
         is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
         is_coded = _moves(coded, covariance) & ~is_turning
         sines = np.where(is_coded[..., None], _sines(coded, coding.is_predicted)[0], 0.0)
@@ -115,7 +104,7 @@ def without_coding_shift(
         is_shifted = shift.any(axis=1, keepdims=True)
         place = np.where(is_shifted, coding.from_coded(coded - shift), poses[:, :2])
         sizes = sines * np.minimum(VARIES_PX, VARIES_SHARE * np.abs(own_px))
-        # A vector for each step and axis: along x those of x, along y those of y.
+        # a vector for each step and axis: along x those of x, along y those of y.
         uncertain = sizes.transpose(0, 2, 1)[..., None] * np.eye(2)
         uncertain = uncertain.reshape(len(poses), 2 * len(STEPS_PER_PX), 2)
         away = coding.from_coded(coded[:, None] + uncertain) - coding.from_coded(coded[:, None])
@@ -131,11 +120,6 @@ def coding_shift_amplitudes_px(
     """The amplitudes a_k, px, of each object along each axis, for each of `STEPS_PER_PX`.
 
     0 where too little moves in the video to tell; the video's where too little of the object does.
-
-    Args:
-      paths: per object `place`, px, and `covariance` of image noise, px^2; NaN where not visible.
-      is_predicted: which frames are predicted from the frame before them.
-      clock: when each frame was taken, in usual steps.
     """
     found = np.zeros((len(paths), 2, len(STEPS_PER_PX)))
     pieces = [
@@ -158,17 +142,11 @@ def coding_shift_amplitudes_px(
 
 
 class _Smooth(NamedTuple):
-    """Pieces of smooth motion, less a parabola each.
+    """Pieces of smooth motion, less a parabola each."""
 
-    Attributes:
-      left: `[..., frame]`, px, what a parabola leaves of the places.
-      pattern: `[..., frame, step]`, what it leaves of the sines.
-      slope: `[..., frame, step]`, the sines' derivatives by the displacement, 1/px.
-    """
-
-    left: np.ndarray
-    pattern: np.ndarray
-    slope: np.ndarray
+    left: np.ndarray  # `[..., frame]`, px, what a parabola leaves of the places
+    pattern: np.ndarray  # `[..., frame, step]`, what it leaves of the sines
+    slope: np.ndarray  # `[..., frame, step]`, the sines' derivatives by the displacement, 1/px
 
     @property
     def degrees(self) -> float:
@@ -212,14 +190,10 @@ def _likeliest(
     sd_px: Float[np.ndarray, " step"],
     usual_noise2: float,
 ) -> Float[np.ndarray, " step"]:
-    """The most probable amplitudes, px; the noise's size is integrated out.
+    """The most probable amplitudes, px, of pieces `[piece, frame]`, whatever the noise's size.
 
-    Args:
-      pieces: `[piece, frame]` each.
-      usual_px: the prior's middle.
-      sd_px: the prior's standard deviations.
-      usual_noise2: px^2, as much as `OWN_NOISE_VALUES` values have, beside the pieces'; 0: nothing
-        is known of the noise.
+    The prior is `usual_px` +- `sd_px`. `usual_noise2`, px^2, weighs as `OWN_NOISE_VALUES` values;
+    0: nothing is known of the noise.
     """
     beside = OWN_NOISE_VALUES if usual_noise2 else 0.0
     degrees = pieces.degrees + beside

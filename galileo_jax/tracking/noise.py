@@ -4,50 +4,38 @@ from collections.abc import Sequence
 
 import numpy as np
 
-MOVED_SDS = 4.0  # A step of more standard deviations than these is a motion, not noise
+MOVED_SDS = 4.0  # a step of more standard deviations than these is a motion, not noise
 MIN_WINDOWS = 8  # fewer third differences do not tell a variance
 THIRD_FRAMES = 4  # frames of a third difference
 CHI2_MEDIAN = 0.4549  # median of chi^2 with one degree of freedom
 CUT_SDS, CUT_VARIANCE = 3.0, 0.9733
-"""Differences beyond are blows; the variance that a normal keeps when it is cut there."""
+"""Differences beyond are blows; the variance that a normal keeps there."""
 SAMPLING_SD_PX = 0.002
-"""The alignment's own error, per axis, that sampling a texture with pixels makes, measured on drawn
-boxes without noise: 0.0008 px from place to place, 0.0019 px where they also turn. It is counted
-at rest, too, where it does not change: what noise has in common from frame to frame is not
-stated otherwise."""
-MEMORY_FRAMES = 3
-"""Coded video repeats the noise of what stands still: at lags of 1, 2 and 3 frames it was seen
-to correlate by 0.45, 0.2 and 0.1 (MPEG-4), so that so many frames count as one."""
+"""The alignment's own error, per axis, that sampling a texture with pixels makes: 0.0008 px from
+place to place, 0.0019 px where boxes also turn (drawn without noise). It is counted at rest,
+too."""
+MEMORY_FRAMES = 3  # at rest noise correlates by 0.45, 0.2, 0.1 at lags of 1, 2, 3 frames (MPEG-4)
 POOLED_FRAMES = 10.0
-"""What all objects of a video have together counts as so many frames of each. With 10 the mean
-square of errors over stated errors differed less from one stretch of a path to the next: by 0.29
-and 0.25 in its logarithm, beyond chance, for 0.36 and 0.41 (along x, object 1 on the ramp and
-object 2 on the table; 60 rendered clips that were looked at)."""
+"""What all objects of a video have together counts as so many frames of each: with 10 the log mean
+square of errors over stated ones differed least between stretches (by 0.27; 60 rendered clips)."""
 OVERLAP = 2.3
-"""Third differences share frames: so many of them tell as much of a variance as one alone (sum of
-their squared correlations, 1 + 2 (0.75^2 + 0.3^2 + 0.05^2))."""
+"""Third differences share frames: so many tell as much of a variance as one (sum of their squared
+correlations, 1 + 2 (0.75^2 + 0.3^2 + 0.05^2))."""
 FAST_PX = 40.0
-"""From a frame to the next: at this speed a smeared picture, coded far from where it was, has twice
-the variance of a slow one. Without it squared errors over stated ones were 1.0 up to 16 px, 1.3 up
-to 32, 1.6 beyond (120 rendered clips that were looked at)."""
+"""From a frame to the next: at this speed a smeared picture has twice the variance of a slow one.
+Else squared errors over stated ones were 1.3 from 16 to 32 px, 1.6 beyond (120 rendered clips)."""
 SETTLES_FRAMES = 5
-"""A coder leaves a picture as it is where little changes. What has come to rest is seen off its
-place for so many frames more: squared errors were 2 to 3 times those stated at rest (60 rendered
-clips that were looked at; lossless ones: none)."""
+"""What has come to rest a coder leaves off its place for so many frames more: squared errors were 2
+to 3 times those stated at rest (60 rendered clips; lossless ones: none)."""
 SLOW_PX, SLOW_SCALE2 = 0.1, 3.0
-"""Per frame: what moves more slowly than that a coder leaves where it was; squared errors were 3
-times those of faster motion, and so they were in the frame after the last step; in the four frames
-after that they were 0.6 to 0.9 times as large (120 rendered clips that were looked at)."""
-SUDDEN_PX = 1.0
-"""What a blow moves by a frame; less is not worth telling from the slow beginning of a slide."""
-GROWS = 1.25
-"""Steps of a slide from rest are as 1 : 3 : 5; those after a blow stay as they are, or decrease."""
+"""Per frame: what moves more slowly, and in the frame after the last step, a coder leaves where it
+was; squared errors were 3 times those of faster motion (120 rendered clips)."""
+SUDDEN_PX = 1.0  # what a blow moves by a frame; less may be the slow beginning of a slide
+GROWS = 1.25  # steps of a slide from rest are as 1 : 3 : 5; those after a blow stay or decrease
 AFTER_BLOW_SCALE2 = (4.0, 2.0)
-"""In the first two frames of a motion that a blow began squared errors are so many times those of
-the later ones: rms 0.026 and 0.018 for 0.013 px in 60 rendered clips that were looked at, 0.013 and
-0.009 for 0.006 px in 12 lossless ones."""
-STEADY_FRAMES = 9
-"""The median of so many accelerations is not touched by two blows, of two or three frames each."""
+"""In the first two frames of a motion that a blow began: rms 0.026 and 0.018 for later 0.013 px in
+60 rendered clips, 0.013 and 0.009 for 0.006 px in 12 lossless ones."""
+STEADY_FRAMES = 9  # the median of so many accelerations is not touched by two blows
 BLOW_KNOWN_TO = 0.5
 """Share of a blow's shift that stays unknown: a turn over an edge takes its time, and the open
 share of the exposure is known to some 15 %."""
@@ -68,11 +56,8 @@ def is_in_motion(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """`[frame, 2]`, per image axis: whether what is tracked moves there, or did just before.
 
     A frame counts if the step into it, out of it, or into one of the `SETTLES_FRAMES` before is
-    beyond noise: a coder holds back the beginning of a motion, and is late at its end.
-
-    Args:
-      place: `[frame, 2]`, px, finite.
-      covariance: `[frame, 2, 2]`, px^2, image noise.
+    beyond noise: a coder holds back the beginning of a motion, and is late at its end. `place`
+    `[frame, 2]`, px, is finite; `covariance` `[frame, 2, 2]` is that of image noise.
     """
     moved = has_moved(place, covariance)
     out_of = np.pad(moved, ((0, 1), (0, 0)))
@@ -81,10 +66,7 @@ def is_in_motion(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def after_blow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """`[frame, 2]`: how many times the variance of motion an axis has where a blow begins it.
-
-    Arguments as those of `is_in_motion`.
-    """
+    """`[frame, 2]`: by what the variance of motion grows where a blow begins it."""
     moved = has_moved(place, covariance)
     # Into the frame that a step leaves; what moves in its first frame may have moved before.
     stood = ~np.pad(moved, ((1, 0), (0, 0)), constant_values=True)[:-1]
@@ -99,10 +81,10 @@ def after_blow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def slow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """`[frame, 2]`: how many times the variance of motion an axis has along which hardly any is.
+    """`[frame, 2]`: by what the variance of motion grows along an axis where hardly anything moves.
 
     What has come to rest is not in motion: from the second frame after its last step on it has the
-    usual variance. Arguments as those of `is_in_motion`.
+    usual variance.
     """
     moved = np.pad(has_moved(place, covariance), ((2, 0), (0, 0)))
     step = np.abs(np.diff(place, axis=0, prepend=place[:1]))
@@ -110,11 +92,7 @@ def slow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def speed_scale2(place: np.ndarray) -> np.ndarray:
-    """`[frame]`: how many times the scatter of slow motion an object has, by its speed.
-
-    Args:
-      place: `[frame, 2]`, px; NaN where not visible, and 1 there.
-    """
+    """`[frame]`: by what slow motion's scatter grows with the speed; 1 where not visible."""
     step = np.hypot(*np.diff(place, axis=0, prepend=place[:1]).T)
     return 1.0 + (np.nan_to_num(step) / FAST_PX) ** 2
 
@@ -126,17 +104,12 @@ def motion_variance(
 
     A coder predicts what moves from the frame before, shifted by half or quarter pixels, and
     codes of the rest only what is large: the picture is drawn towards its predictions. So are
-    alignments; along the motion and at any speed (0.02 px in MPEG-4, five times the noise).
-    All objects of a video share the coder: what they scatter is pooled. It grows with speed
-    (`speed_scale2`).
+    alignments; along the motion and at any speed (0.02 px in MPEG-4, five times the noise). All
+    objects of a video share the coder: what they scatter is pooled. Third differences remove smooth
+    motion; those beyond three standard deviations are blows and left out. 0 where too few are left.
 
-    Third differences remove smooth motion; those beyond three standard deviations are blows
-    and are left out, starting from the median. 0 where too few are left to tell.
-
-    Args:
-      paths: per object `place` `[frame, 2]` and `covariance` `[frame, 2, 2]` of image noise;
-        NaN where not visible.
-      clock: `[frame]`, when each frame was taken, in usual steps.
+    `paths` has per object `place` `[frame, 2]` and `covariance` `[frame, 2, 2]` of image noise, NaN
+    where not visible; `clock` when each frame was taken, in usual steps.
     """
     excess = np.zeros(2)
     for axis in range(2):
@@ -156,12 +129,7 @@ def motion_scale2(place: np.ndarray, covariance: np.ndarray, clock: np.ndarray) 
 
     The excess is pooled over all objects, and image noise is overstated where a picture is smeared;
     an object's own third differences tell what it is. They weigh against `POOLED_FRAMES` frames
-    that are as stated.
-
-    Args:
-      place: `[frame, 2]`, px; NaN where not visible.
-      covariance: `[frame, 2, 2]`, px^2, stated, with the excess in motion.
-      clock: `[frame]`, when each frame was taken, in usual steps.
+    that are as stated. `covariance` is with the excess in motion.
     """
     scale2 = np.ones(2)
     for axis in range(2):
@@ -180,13 +148,8 @@ def _third_differences(
     """`[3, window]`: squared third differences of `[frame]` while moving, and their variances.
 
     Of unevenly spaced frames the divided difference, 3! sum_i x_i / prod_(j != i) (t_i - t_j),
-    which removes parabolas all the same.
-
-    Args:
-      place: px.
-      clock: when each frame was taken, in usual steps.
-      variance: px^2, stated; the second row has what it makes of the third differences.
-      excess: of another error, or None; the third row has the same of it.
+    which removes parabolas all the same. The second row has what the stated `variance` makes of it,
+    the third what another error, `excess`, does.
     """
     if len(place) < THIRD_FRAMES:
         return np.empty((3, 0))
@@ -225,13 +188,9 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     When the blow fell is told by how the jump is shared with the frame beside: a share
     |t| / frame of dv shows there. Only what exceeds the steady acceleration around it is a blow.
 
-    Limits: the shift is in the measured jumps, too, so that it comes out up to a half too small
-    for a picture's mean place. An alignment prefers the sharper of the two motions in it, and
-    over 40 rendered blows the shifts found were as small: see `BLOW_KNOWN_TO`.
-
-    Args:
-      jumps: `[frame, 2]`, change of the velocity at each frame, px per frame.
-      exposure_share: open share of a frame's time.
+    Limits: the shift is in the measured `jumps` (`[frame, 2]`, px per frame), too, so that it comes
+    out up to a half too small for a picture's mean place. An alignment prefers the sharper of the
+    two motions in it, and over 40 rendered blows the shifts were as small: see `BLOW_KNOWN_TO`.
     """
     if not exposure_share:
         return np.zeros_like(jumps)

@@ -5,16 +5,12 @@ import numpy as np
 
 from galileo_jax.tracking.pose import SHARP_PX, smeared_along, square_around
 
-MARGIN_PX = 6  # how far an object may move in an alignment before more of the frame is smoothed
-PART_MARGIN_PX = 24
-"""A part that is kept for later holds so much more: room for the alignment and the smoothing."""
+MARGIN_PX = 6  # by which an object may move before more of the frame is smoothed
+PART_MARGIN_PX = 24  # more that a kept part holds: room for the alignment and the smoothing
 UPSAMPLED_TO_PX = 2.0  # what is smoothed less than this is kept at twice the frame's resolution
-PYRAMID_VARIANCE_PX2 = 0.25
-"""OpenCV's `pyrUp` smooths by the binomial (1 4 6 4 1) / 16 of half pixels, while it doubles."""
-LINEAR_SHARE = 1 / 6
-"""Linear interpolation between samples `h` apart smooths by a variance of this times h^2."""
-SAME_SMEAR_PX, MAX_SMEARED = 0.5, 8
-"""Smears that are alike to this are made once; so many of them are kept."""
+PYRAMID_VARIANCE_PX2 = 0.25  # of OpenCV's `pyrUp`, which smooths half pixels by (1 4 6 4 1) / 16
+LINEAR_SHARE = 1 / 6  # of h^2: the variance of linear interpolation between samples h apart
+SAME_SMEAR_PX, MAX_SMEARED = 0.5, 8  # smears alike to this are made once; so many are kept
 
 
 class Picture:
@@ -32,13 +28,7 @@ class Picture:
         corner_px: tuple[int, int] = (0, 0),
         size_px: tuple[int, int] | None = None,
     ):
-        """The frame, or a part of it.
-
-        Args:
-          grey: `[height, width]` uint8.
-          corner_px: its upper left pixel's place in the frame.
-          size_px: (width, height) of the frame; None: it is all of it.
-        """
+        """The frame `[height, width]` uint8, or a part of it from `corner_px` on."""
         self.grey = grey
         self._corner_px = corner_px
         self.size_px = (grey.shape[1], grey.shape[0]) if size_px is None else size_px
@@ -80,13 +70,9 @@ class Picture:
     def at(self, pose: np.ndarray, own: np.ndarray, reach_px: float, width_px: float) -> np.ndarray:
         """The values at places of an object, smoothed by a Gaussian, `[place]` float32.
 
-        Args:
-          pose: `(x, y, angle)` of the object.
-          own: `[2, place]`, the places in its own axes, float32.
-          reach_px: none of them is farther from the object's point.
-          width_px: of the Gaussian, at least 0.6.
-
-        Beyond its border the frame is continued by its last pixels.
+        `own` `[2, place]` are the places in the axes of the pose `(x, y, angle)`, none farther than
+        `reach_px` from its point; `width_px` of the Gaussian is at least 0.6. Beyond its border the
+        frame is continued by its last pixels.
         """
         window = self._windows.get(width_px)
         place = pose[:2] - self._corner_px

@@ -30,16 +30,15 @@ MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
 """An object is visible if its patch correlates with the template, no more of it than these
 shares differs from the template by more than noise, or lies beyond the picture's border."""
 
-LONG_RUN = 10  # A run of so many frames is believed after any gap
-SAME_PLACE_PX = 1.0  # what comes back this close to where it was last seen had only been covered
+LONG_RUN = 10  # of frames is believed after any gap
+SAME_PLACE_PX = 1.0  # what comes back this close to where it was had only been covered
 
 
 LONG_GAP, PATH_FRAMES = 4.0, 8
 """After so many usual steps out of sight the path of so many frames before has to lead to where an
 object is seen again."""
 LEAST_WAY_PX, OFF_WAY = 10.0, 0.5
-"""If it would have gone so far meanwhile, it may be off by this share of that: less than what is
-thrown back."""
+"""If it would have gone so far meanwhile, it may be off by this share of that."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +62,8 @@ def finished(
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
-    Args:
-      fits: per piece, per frame.
-      pieces: with the points to follow, each in its piece's first frame.
-      shares: per piece, the open share of a frame's time.
-      coding: of the frames.
-      clock: `[frame]`, when each was taken, in usual steps.
-      is_alone: there is one object, which no other one can hit while it is hidden.
+    `shares` are open shares of a frame's time; `clock` `[frame]` is in usual steps. One object
+    alone (`is_alone`) no other can hit while it is hidden.
     """
     seen = [
         _seen(found, piece.corrected, clock if is_alone else None)

@@ -11,29 +11,23 @@ from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import moved, own_motion, rotation
 from galileo_jax.tracking.template import Template
 
-SURE = 0.85  # A fit that correlates better than this ends the search for others
-CONTRAST = (0.4, 2.5)  # what shows the template paler or stronger than this is something else
+SURE = 0.85  # a fit that correlates better ends the search for others
+CONTRAST = (0.4, 2.5)  # what shows the template paler or stronger is something else
 TURNS_RAD = (0.0, 0.17, -0.17, 0.35, -0.35)
-"""Turns tried in a wide search: the alignment reaches 5 degrees to each side of them."""
+"""Tried in a wide search; the alignment reaches 5 degrees more."""
 MAX_PEAKS = 4
-DIRECTIONS, SPEEDS = 16, 6
-"""Velocities after a blow that are tried: the smear is then right to a sixth of its length."""
+DIRECTIONS, SPEEDS = 16, 6  # of velocities after a blow: smears are then right to a sixth
 BLOW_MARGIN_PX = 4.0
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Where an object may be, and how picture and template are made alike before they are compared.
+    """Where an object may be, and how picture and template are made alike to be compared."""
 
-    Attributes:
-      pose: to start from.
-      motion: (own axes) in the exposure; the template is smeared by it.
-      through: (own axes) the smear that is in the template; the picture is given it, too. None:
-        it is left as it is.
-    """
-
-    pose: np.ndarray
-    motion: np.ndarray
+    pose: np.ndarray  # to start from
+    motion: np.ndarray  # (own axes) in the exposure; the template is smeared by it
+    # (own axes) the smear that is in the template; the picture is given it, too. None: it is left
+    # as it is
     through: np.ndarray | None = None
 
     def pair(self, picture: Picture, template: Template, width_px: float) -> tuple[Picture, Target]:
@@ -100,21 +94,12 @@ def after_blow(
     """Guesses for an object that has been struck since it was last seen, smeared as it then is.
 
     What moves fast is smeared beyond recognition, but the smear tells where to look: struck at a
-    time f after the last frame, an object with the velocity v since is at
+    time f after the last frame, `frames` usual steps ago, an object with the velocity v since is at
 
         pose + f velocity + (frames - f) v,    0 <= f <= 1,    smeared by share v.
 
-    So for velocities of `DIRECTIONS` directions and `SPEEDS` sizes the smeared template is looked
-    for where each would have taken it.
-
-    Args:
-      picture: the frame.
-      template: the object's.
-      pose: where it was last seen.
-      velocity: its change per frame there.
-      frames: usual steps since then.
-      shares: of a frame's time that the shutter may be open.
-      most_px: no blow makes it faster, per frame.
+    So for velocities of `DIRECTIONS` directions and `SPEEDS` sizes, up to `most_px` per frame, the
+    smeared template is looked for where each would have taken it.
     """
     found: list[tuple[float, Guess]] = []
     turns = TURNS_RAD if template.shows_turns else TURNS_RAD[:1]

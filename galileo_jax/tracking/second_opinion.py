@@ -15,27 +15,22 @@ from galileo_jax.tracking.refiner import velocities_at
 from galileo_jax.tracking.silhouette import MOST_MISSED, Path, way_px
 
 LOST_SHARE = 0.05
-"""Of the frames in which an object is looked for: if it is missed in more, its silhouette is."""
-TURNED_RAD = 0.5
-"""What is round and turns by more may be followed by its marks instead of its middle."""
-LEAST_FRAMES, LEAST_SHARE = 3, 0.1
-"""A silhouette has to show so many frames more, and this share of those that are known."""
+"""Of the frames in which an object is looked for: missed in more, its silhouette is."""
+TURNED_RAD = 0.5  # what is round and turns by more may be followed by its marks, not its middle
+LEAST_FRAMES, LEAST_SHARE = 3, 0.1  # more that a silhouette has to show; of those that are known
 SAME_FRAMES, SAME_PX, SAME_SIZE = 5, 0.5, 0.05
-"""The middles of texture and silhouette are a fixed distance apart if over so many frames they
-agree to this, in pixels or by the object's size."""
+"""Middles of texture and silhouette are a fixed distance apart if over so many frames they agree to
+this, in pixels or by the object's size."""
 INSIDE, BESIDE = 0.5, 2.0
 """A silhouette is the object's if its middle is within this share of its size of where the texture
 is, or if it begins within so many sizes of where that was last seen."""
 STAYS_PX, FARTHER = 20.0, 3.0
-"""What is followed and goes less far may be what is behind a smeared object: it is if a silhouette
-sets out from there and goes so many times as far."""
+"""What goes less far may be what is behind a smeared object: it is if a silhouette sets out from
+there and goes so many times as far."""
 ON_OBJECT = 0.3
-"""Standard deviation per axis of a point somewhere on an object about its middle, by its size: of a
-square's points 1 / sqrt(12)."""
-OUTLINE_AREA = (0.3, 6.0)
-"""A silhouette's area by that of the declared outline: a smear makes it larger."""
-EDGE_PX = 0.03
-"""Standard deviation that sampling a sharp edge with pixels gives the middle of a silhouette."""
+"""Sd per axis of a point somewhere on an object, by its size: of a square 1 / sqrt(12)."""
+OUTLINE_AREA = (0.3, 6.0)  # a silhouette's area by that of the outline: a smear makes it larger
+EDGE_PX = 0.03  # sd that sampling a sharp edge with pixels gives the middle of a silhouette
 USUAL_SHARE = 0.5  # of a frame's time for which the shutter may be open
 ARM = 0.25  # pixels that come and go at the rim are about this share of the size from the middle
 
@@ -66,12 +61,6 @@ def with_silhouette(
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
     they are apart is then an unknown shift of the silhouette. Of a texture that hardly moves while
     a silhouette sets out from it, the first frame alone counts: it is of the scene behind.
-
-    Args:
-      found: by texture.
-      start: of the object.
-      paths: of all silhouettes.
-      clock: when each frame was taken, in usual steps.
     """
     seen = np.isfinite(found.angle_rad)
     if _stays(found, seen):

@@ -20,41 +20,31 @@ from galileo_jax.observation.least_squares import polynomial
 from galileo_jax.tracking.pose import length
 from galileo_jax.tracking.template import grey
 
-SCENE_FRAMES = 15
-"""So many frames, evenly over the film, show the scene: an object that is elsewhere in most of
-them is not in it."""
-NOISE_SDS, LEAST_GREY = 6.0, 10.0
-"""What differs by less than so many standard deviations, or grey levels, is noise."""
+SCENE_FRAMES = 15  # evenly over the film, show the scene: what is elsewhere in most is not in it
+NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or grey levels, is noise
 SMOOTH_PX = 1.0
 LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
-"""Parts that are smaller, or larger than this share of the picture, are no objects."""
+"""Parts smaller, or larger than this share of the picture, are none."""
 MOST_FOREGROUND = 0.3  # if more of a picture differs the camera moves
 SAME_AREA = 1.5  # from a frame to the next an object's silhouette grows or shrinks by less
 OFF_SIZE, OFF_STEP = 0.6, 0.35
-"""How far a part may be from where a path leads, by its size and by the way it goes."""
+"""How far a part may be from where a path leads, by its size and its way."""
 MOST_AT_FIRST = 4.0
-"""By so many of its sizes a thing is at most gone in the frame after the one that shows it first: a
-ball of 15 pixels by 60."""
+"""By so many of its sizes a thing is at most gone in the frame after its first: a ball of 15 px by
+60."""
 MOST_MISSED = 4.0  # usual steps for which a path may be hidden
 TURN_BACK = 1.3  # what comes off a wall is at most so many of its steps away from where it was
-LEADS_FRAMES, DEGREE = 4, 2  # A parabola through so many frames leads on
+LEADS_FRAMES, DEGREE = 4, 2  # a parabola through so many frames leads on
 
 
 @dataclass(frozen=True)
 class Part:
-    """One connected part of a silhouette.
+    """One connected part of a silhouette."""
 
-    Attributes:
-      centre_px: `[2]`.
-      area_px2: pixels.
-      low_px: `[2]`, upper left corner of the box around it.
-      high_px: `[2]`, lower right one.
-    """
-
-    centre_px: np.ndarray
-    area_px2: float
-    low_px: np.ndarray
-    high_px: np.ndarray
+    centre_px: np.ndarray  # `[2]`
+    area_px2: float  # pixels
+    low_px: np.ndarray  # `[2]`, upper left corner of the box around it
+    high_px: np.ndarray  # `[2]`, lower right one
 
     @property
     def size_px(self) -> float:
@@ -118,12 +108,7 @@ class Path:
 def paths_of(
     open_frames: Callable[[], Iterable[np.ndarray]], clock: Float[np.ndarray, " frame"]
 ) -> list[Path]:
-    """The paths of all that moves before a scene that stands still; none if the camera moves.
-
-    Args:
-      open_frames: gives the frames from the beginning; called twice.
-      clock: when each frame was taken, in usual steps.
-    """
+    """The paths of all that moves before a scene that stands still; none if the camera moves."""
     scene = _scene(open_frames, len(clock))
     done: list[Path] = []
     going: list[Path] = []

@@ -24,17 +24,11 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True)
 class SquareView:
-    """How the picture's pixels and those of the square view belong together.
+    """How the picture's pixels and those of the square view belong together."""
 
-    Attributes:
-      plane: the picture's pixels to metres.
-      view: the view's pixels to metres.
-      size_px: of the view.
-    """
-
-    plane: PicturePlane
-    view: PicturePlane
-    size_px: tuple[int, int]
+    plane: PicturePlane  # the picture's pixels to metres
+    view: PicturePlane  # the view's pixels to metres
+    size_px: tuple[int, int]  # of the view
 
     def from_picture(self, points_px: Float[np.ndarray, "*point 2"]) -> np.ndarray:
         """Pixels of the picture to those of the view."""

@@ -13,30 +13,22 @@ CORE_SHARE = 0.88
 """Only this share of the declared size is compared: the rim shows background when the scale
 is a few percent off, and is what another object touches."""
 RIM_SHARE = 1.4
-"""An object without texture of its own is compared up to this share of its size instead: its
-edge against what is behind it."""
+"""Of its size: up to where a plain object is compared, its edge against what is behind."""
 PLAIN = 2.0e3
-"""Texture (see `template_at`) below which an object counts as without: with a noise of five grey
+"""Texture (see `template_at`) below which an object counts as plain: with a noise of five grey
 levels its place would be known to 0.1 px only."""
-WINDOW_PX = 21
-"""Side of the region when the size is unknown: the object and some of what is around it."""
-ALWAYS = 0.99  # A pixel is compared that the object covers for at least this share of the exposure
-MIN_REGION_SHARE = 0.3  # A smeared region never shrinks below this share of the sharp one
+WINDOW_PX = 21  # side of the region of unknown size: the object and some of what is around it
+ALWAYS = 0.99  # of the exposure that the object covers a pixel that is compared
+MIN_REGION_SHARE = 0.3  # of the sharp region that a smeared one keeps at least
 
 
 @dataclass(frozen=True)
 class Outline:
-    """The rectangle (or disc) an object fills in the image.
+    """The rectangle (or disc) an object fills in the image."""
 
-    Attributes:
-      size_px: (width, height) in the object's own axes; None if unknown.
-      angle_rad: how much those axes are turned in the template's frame.
-      is_round: a disc or ring seen from the side of its axis.
-    """
-
-    size_px: tuple[float, float] | None
-    angle_rad: float = 0.0
-    is_round: bool = False
+    size_px: tuple[float, float] | None  # (width, height) in the object's own axes; None if unknown
+    angle_rad: float = 0.0  # how much those axes are turned in the template's frame
+    is_round: bool = False  # a disc or ring seen from the side of its axis
 
 
 @dataclass(frozen=True)
@@ -70,13 +62,10 @@ class Template:
     def target(
         self, motion: np.ndarray, width_px: float, through: np.ndarray | None = None
     ) -> Target:
-        """What a patch looks like that moves by `motion` (own axes) during the exposure.
+        """What a patch looks like that moves by `motion` (own axes) during the exposure, smoothed.
 
-        Args:
-          motion: in the exposure.
-          width_px: of the Gaussian that smooths both.
-          through: the smear that is in this template and is given to the picture, too; what
-            neither smear brings in from beside the object is compared.
+        `through` is a smear that is in this template and is given to the picture, too: what neither
+        smear brings in from beside the object is compared.
         """
         smeared = smear(self.image, motion)
         if smeared is self.image and through is None:

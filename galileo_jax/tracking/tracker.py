@@ -25,15 +25,10 @@ MAX_KEPT_BYTES = 256 << 20  # of a longer video the second pass decodes the fram
 
 @dataclass(frozen=True)
 class Seen:
-    """What the first pass has found in a frame.
+    """What the first pass has found in a frame."""
 
-    Attributes:
-      frame: its number.
-      places_px: by object `(x, y)`; None: not found.
-    """
-
-    frame: int
-    places_px: tuple[tuple[float, float] | None, ...]
+    frame: int  # its number
+    places_px: tuple[tuple[float, float] | None, ...]  # by object `(x, y)`; None: not found
 
 
 def track_video(
@@ -61,8 +56,7 @@ def track_video(
       starts: at least one.
       times_s: `[frame]`, increasing, when each was taken.
       coding: how the frames were coded. None: each for itself.
-      advance: called after every frame of both passes (a progress bar), of the first one with
-        what it has found.
+      advance: called after every frame of both passes, of the first one with what it has found.
     """
     clock = in_steps(times_s)
     first = _from_frame_to_frame(open_frames, starts, clock, advance)
@@ -86,21 +80,13 @@ def track_video(
 
 @dataclass
 class _FirstPass:
-    """What following from frame to frame gives.
+    """What following from frame to frame gives."""
 
-    Attributes:
-      pieces: of each start.
-      kept: what is around the objects.
-      exposure: as far as smears show it.
-      count: of frames.
-      size_px: of the picture.
-    """
-
-    pieces: list[list[Piece]]
-    kept: "_Kept"
-    exposure: Exposure
-    count: int = 0
-    size_px: tuple[int, int] = (0, 0)
+    pieces: list[list[Piece]]  # of each start
+    kept: "_Kept"  # what is around the objects
+    exposure: Exposure  # as far as smears show it
+    count: int = 0  # of frames
+    size_px: tuple[int, int] = (0, 0)  # of the picture
 
 
 def _from_frame_to_frame(

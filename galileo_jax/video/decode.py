@@ -19,16 +19,12 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.video.stamps import at_declared_rate, clock_of, is_blank, listed, repeats
 from galileo_jax.video.weave import NO_ROWS, Rows, first_field, rows_of
 
-MIN_FRAMES = 4
-"""With fewer pictures there is no change of speed to see; also tells a picture from a film."""
-MAX_MISSING_SHARE = 0.02
-"""Pictures announced but not decodable that are only warned of: containers miscount by one or
-two."""
-BLOCK_PX = 8  # pictures are compared by the mean difference of blocks, which noise hardly changes
+MIN_FRAMES = 4  # fewer show no change of speed; also tells a picture from a film
+MAX_MISSING_SHARE = 0.02  # only warned of: containers miscount by one or two
+BLOCK_PX = 8  # pictures are compared by blocks' means, which noise hardly changes
 SQUARE = 1e-3  # pixels whose sides differ by less are taken as square
 KINDS = "?IPBSipb"  # FFmpeg's kinds of pictures by number
-FIELDS = "bwdif=mode=send_field:parity={}"
-"""FFmpeg's filter that makes of each interlaced picture two, one for each of its fields."""
+FIELDS = "bwdif=mode=send_field:parity={}"  # of each interlaced picture two
 
 
 @dataclass(frozen=True)
@@ -141,34 +137,21 @@ def predicted_from_before(path: Path) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Scan:
-    """What one pass through a film shows.
+    """What one pass through a film shows."""
 
-    Attributes:
-      size_px: (width, height) as shown.
-      pixel_aspect: width of a pixel by its height.
-      first_field: pictures are fields, of which each frame's first is the upper ("tff") or lower
-        one ("bff"); None: they are whole.
-      stamps_s: `[picture]`; NaN where missing.
-      is_even: the container knows no times, only a rate.
-      tick_s: what they are rounded to.
-      kinds: a letter for each picture.
-      change: `[picture]`, grey levels, see `repeats`.
-      contrast: `[picture]`, grey levels.
-      rate: pictures per second that the container states; 0: none.
-      missing: pictures that it announces and that are not there.
-    """
-
-    size_px: tuple[int, int]
-    pixel_aspect: float
+    size_px: tuple[int, int]  # (width, height) as shown
+    pixel_aspect: float  # width of a pixel by its height
+    # pictures are fields, of which each frame's first is the upper ("tff") or lower one ("bff");
+    # None: they are whole
     first_field: str | None
-    stamps_s: np.ndarray
-    is_even: bool
-    tick_s: float
-    kinds: str
-    change: np.ndarray
-    contrast: np.ndarray
-    rate: float
-    missing: int
+    stamps_s: np.ndarray  # `[picture]`; NaN where missing
+    is_even: bool  # the container knows no times, only a rate
+    tick_s: float  # what they are rounded to
+    kinds: str  # a letter for each picture
+    change: np.ndarray  # `[picture]`, grey levels, see `repeats`
+    contrast: np.ndarray  # `[picture]`, grey levels
+    rate: float  # pictures per second that the container states; 0: none
+    missing: int  # pictures that it announces and that are not there
 
     @property
     def is_interlaced(self) -> bool:

@@ -7,39 +7,29 @@ from jaxtyping import Bool, Float
 
 REPEATED, NEAR_FRAMES = 0.2, 5
 """A picture repeats the one before if it differs from it by less than this share of what pictures
-differ by shortly before and shortly after it; a motion that begins or ends changes on one side."""
+differ by shortly before and after; a motion that begins or ends changes on one side."""
 LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
-"""So many, and this share of the pictures in which something moves: fewer are chance, such as the
-turn of a swing. 24 pictures a second stored as 30 repeat one in five."""
+"""Fewer, or less of the pictures in which something moves, are chance (the turn of a swing); 24 a
+second stored as 30 repeat one in five."""
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
-FADED = 0.5  # of the usual contrast: paler pictures at the beginning and the end belong to a fade
-AS_DECLARED = 0.02  # A declared rate that is so near the film's confirms the film's own times
+FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
+AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
 
 
 @dataclass(frozen=True)
 class Clock:
-    """When pictures were taken.
+    """When pictures were taken."""
 
-    Attributes:
-      times_s: `[picture]`, the first is 0.
-      rate: pictures per second; of a film with lost pictures that of the others.
-      is_even: whether all pictures lie on an even grid, a whole number of steps apart.
-    """
-
-    times_s: Float[np.ndarray, " picture"]
-    rate: float
-    is_even: bool
+    times_s: Float[np.ndarray, " picture"]  # `[picture]`, the first is 0
+    rate: float  # pictures per second; of a film with lost pictures that of the others
+    is_even: bool  # whether all pictures lie on an even grid, a whole number of steps apart
 
 
 def clock_of(stamps_s: Float[np.ndarray, " picture"], tick_s: float) -> Clock:
-    """The clock that a film's time stamps show.
+    """The clock that a film's time stamps show, which increase and are rounded to `tick_s`.
 
     Stamps that are an even grid but for their rounding are taken as that grid, in which pictures
     may be missing; others as they are.
-
-    Args:
-      stamps_s: finite, increasing, at least two.
-      tick_s: what they are rounded to.
     """
     steps = np.diff(stamps_s)
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1))])
@@ -54,10 +44,6 @@ def at_declared_rate(clock: Clock, fps: float) -> tuple[Clock, float]:
 
     A film of 240 pictures a second that is stored as 30 runs eight times faster. Where pictures
     are unevenly spaced a declared rate near the film's only confirms it.
-
-    Args:
-      clock: the film's.
-      fps: pictures per second.
     """
     steps = np.diff(clock.times_s)
     rates = (clock.rate, len(steps) / float(np.sum(steps)), 1 / float(np.median(steps)))
@@ -73,11 +59,8 @@ def at_declared_rate(clock: Clock, fps: float) -> tuple[Clock, float]:
 def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:
     """Which pictures show once more what the one before shows, though things move.
 
-    Where every second, third, ... picture alone is new, that holds for the whole film.
-
-    Args:
-      change: grey levels by which a picture differs from the one before, where most; the first's
-        is not looked at.
+    `change` is by how many grey levels a picture differs from the one before, where most. Where
+    every second, third, ... picture alone is new, that holds for the whole film.
     """
     count = len(change)
     least = np.zeros(count)
@@ -98,11 +81,7 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
 
 
 def is_blank(contrast: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:
-    """Which pictures at the beginning and the end are black, blank or faded.
-
-    Args:
-      contrast: standard deviation of each picture's grey levels.
-    """
+    """Which pictures at either end are black, blank or faded, by the sd of their grey levels."""
     is_full = np.flatnonzero(contrast >= FADED * np.median(contrast))
     index = np.arange(len(contrast))
     return (index < is_full[0]) | (index > is_full[-1])

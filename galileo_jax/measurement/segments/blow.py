@@ -24,10 +24,7 @@ BOUNCE_CHANCE, BOUNCE_SHARE = 1e-6, 0.1  # a flight has tens of frames
 def jumps(path: PointPath, most_m_s2: float, clear: float) -> Bool[np.ndarray, " middle"]:
     """Whether the velocity changes beyond an acceleration and noise, for each place but the ends.
 
-    Args:
-      path: of an object.
-      most_m_s2: nothing but a blow accelerates so.
-      clear: standard deviations of the change that are no noise.
+    Nothing but a blow accelerates by `most_m_s2`; `clear` standard deviations are no noise.
     """
     step_s, velocity, sd = path.steps
     change = np.linalg.norm(np.diff(velocity[:2]), axis=0)

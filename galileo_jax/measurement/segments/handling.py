@@ -107,9 +107,7 @@ def pushed_frame(observation: Observation) -> int | None:
 def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
     """The first frame in which object 1 is free of the hand that throws or drops it; None: at once.
 
-    Args:
-      observation: the motion of the scene, to where it ends.
-      rest_belongs: whether it may lie still at first, without a hand.
+    It may lie still at first, without a hand, where its `rest_belongs` to the motion.
     """
     path = observation.path()
     if len(path) < 3 * FEWEST:

@@ -74,11 +74,8 @@ def _is_still(path: PointPath) -> np.ndarray:
 def rest_frame(observation: Observation, radius_m: float) -> int | None:
     """The last frame worth a look; None where something moves to the end, or almost so.
 
-    After all has come to rest a film shows only how its camera drifts.
-
-    Args:
-      observation: of all objects, `[object, axis, frame]`; x and y count.
-      radius_m: of the smallest object.
+    After all has come to rest a film shows only how its camera drifts. `radius_m` is that of the
+    smallest object.
     """
     last = []
     for path in filter(len, map(observation.path, range(len(observation.names)))):

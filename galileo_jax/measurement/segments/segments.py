@@ -133,13 +133,7 @@ def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
 
 
 def segment(clip: Clip, observation: Observation, track: Track | None = None) -> Segments:
-    """The segments of a track.
-
-    Args:
-      clip: what is declared.
-      observation: of all the clip.
-      track: the same in pixels; None: it was tracked elsewhere, and nothing has gone astray.
-    """
+    """The segments of a track; of one made elsewhere (`track` None) nothing has gone astray."""
     scenario, whole = SCENARIOS[clip.scenario], _Kept(observation)
     if scenario.is_level:
         kept = whole.end_with(_end_of_pucks(clip, observation))

@@ -41,19 +41,12 @@ APART = 0.8
 
 @dataclass(frozen=True)
 class Astray:
-    """From when on an object's track is not to be believed, and why.
+    """From when on an object's track is not to be believed, and why."""
 
-    Attributes:
-      name: the object's.
-      time_s: from when on.
-      why: in words.
-      is_left_out: whether what is tracked from there on is not used.
-    """
-
-    name: str
-    time_s: float
-    why: str
-    is_left_out: bool = False
+    name: str  # the object's
+    time_s: float  # from when on
+    why: str  # in words
+    is_left_out: bool = False  # whether what is tracked from there on is not used
 
     def __str__(self) -> str:
         """Object and time: 'object1 is lost from 0.63 s on'."""
@@ -61,13 +54,7 @@ class Astray:
 
 
 def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Astray, ...]:
-    """The objects whose tracks are not to be believed to their ends.
-
-    Args:
-      clip: without a scale leaps are not reported.
-      observation: the track in metres, as far as it is used.
-      track: in pixels, to the clip's end.
-    """
+    """The objects whose tracks are not to be believed; without a scale nothing leaps."""
     found = []
     for i, name in enumerate(track.names):
         seen = np.flatnonzero(observation.mask[i])

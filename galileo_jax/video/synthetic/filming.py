@@ -11,23 +11,16 @@ class Camera:
     """A camera that looks at the plane of motion from the side, perhaps not quite squarely.
 
     Pixels as in OpenCV: x right, y down, whole numbers at the middle of a pixel.
-
-    Attributes:
-      pixels_per_metre: scale at the origin.
-      origin_px: where the foot of the ramp at table level is.
-      size_px: (width, height).
-      direction: which way x grows in the image.
-      keystone_per_m: (along x, along y), 1/m: how much farther away, relative to its
-        distance at the origin, the plane is per metre; 0 is a camera held squarely.
-      roll_rad: how far the picture is turned about the origin, counter-clockwise.
     """
 
-    pixels_per_metre: float
-    origin_px: tuple[float, float]
-    size_px: tuple[int, int] = (640, 360)
-    direction: Literal["right", "left"] = "right"
+    pixels_per_metre: float  # scale at the origin
+    origin_px: tuple[float, float]  # where the foot of the ramp at table level is
+    size_px: tuple[int, int] = (640, 360)  # (width, height)
+    direction: Literal["right", "left"] = "right"  # which way x grows in the image
+    # (along x, along y), 1/m: how much farther away, relative to its distance at the origin, the
+    # plane is per metre; 0 is a camera held squarely
     keystone_per_m: tuple[float, float] = (0.0, 0.0)
-    roll_rad: float = 0.0
+    roll_rad: float = 0.0  # how far the picture is turned about the origin, counter-clockwise
 
     @property
     def world_to_image(self) -> np.ndarray:
@@ -57,43 +50,28 @@ def project(homography: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand with an arm that holds object 1 at the start, lets go and leaves the picture.
+    """A hand with an arm that holds object 1 at the start, lets go and leaves the picture."""
 
-    Attributes:
-      leave_s: when it begins to draw back, s.
-      speed_m_s: how fast it then goes, m/s.
-      offset_m: (x, y) of its finger tips from object 1's centre at the start, m.
-      angle_rad: direction of the arm, from the finger tips, counter-clockwise from the
-        travel; 2.4 is backwards and up.
-    """
-
-    leave_s: float
-    speed_m_s: float = 1.4
+    leave_s: float  # when it begins to draw back, s
+    speed_m_s: float = 1.4  # how fast it then goes, m/s
+    # (x, y) of its finger tips from object 1's centre at the start, m
     offset_m: tuple[float, float] = (-0.012, 0.015)
+    # direction of the arm, from the finger tips, counter-clockwise from the travel; 2.4 is
+    # backwards and up
     angle_rad: float = 2.4
 
 
 @dataclass(frozen=True)
 class Filming:
-    """Frame rate, exposure and faults.
+    """Frame rate, exposure and faults."""
 
-    Attributes:
-      fps: frames per second; frame i is taken at time i / fps.
-      written_fps: what the file says; None = the truth.
-      exposure_s: how long the shutter is open, evenly about the frame's time, s.
-      noise_grey_levels: standard deviation of the sensor noise, independent in every pixel
-        and colour; of 255.
-      flicker: relative standard deviation of the brightness from frame to frame.
-      defocus_px: standard deviation of the blur of the whole picture, px.
-      repeated_frames: frames that the camera missed; the picture before stands there again.
-      hand: the hand that lets object 1 go; None = nobody is in the picture.
-    """
-
-    fps: float = 30.0
-    written_fps: float | None = None
-    exposure_s: float = 0.008
+    fps: float = 30.0  # frames per second; frame i is taken at time i / fps
+    written_fps: float | None = None  # what the file says; None = the truth
+    exposure_s: float = 0.008  # how long the shutter is open, evenly about the frame's time, s
+    # standard deviation of the sensor noise, independent in every pixel and colour; of 255
     noise_grey_levels: float = 4.0
-    flicker: float = 0.007
-    defocus_px: float = 0.0
+    flicker: float = 0.007  # relative standard deviation of the brightness from frame to frame
+    defocus_px: float = 0.0  # standard deviation of the blur of the whole picture, px
+    # frames that the camera missed; the picture before stands there again
     repeated_frames: tuple[int, ...] = ()
-    hand: Hand | None = None
+    hand: Hand | None = None  # the hand that lets object 1 go; None = nobody is in the picture

@@ -25,17 +25,11 @@ TABLE_TOP_M = 0.06
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the objects are; linear between the times, at rest before and after.
+    """Where the objects are; linear between the times, at rest before and after."""
 
-    Attributes:
-      times_s: `[time]`, s, ascending.
-      position_m: `[object, 2, time]`, centres, x along the travel, y up, m.
-      pitch_rad: `[object, time]`, counter-clockwise positive with x right and y up.
-    """
-
-    times_s: np.ndarray
-    position_m: np.ndarray
-    pitch_rad: np.ndarray
+    times_s: np.ndarray  # `[time]`, s, ascending
+    position_m: np.ndarray  # `[object, 2, time]`, centres, x along the travel, y up, m
+    pitch_rad: np.ndarray  # `[object, time]`, counter-clockwise positive with x right and y up
 
     def at(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Returns positions `[object, 2]` and pitch `[object]`."""
@@ -57,17 +51,11 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Layer:
-    """What one thing adds to a frame.
+    """What one thing adds to a frame."""
 
-    Attributes:
-      window: rows and columns of the frame.
-      colour: `[row, column, 3]`, premultiplied.
-      opacity: `[row, column]`, 0 to 1.
-    """
-
-    window: tuple[slice, slice]
-    colour: np.ndarray
-    opacity: np.ndarray
+    window: tuple[slice, slice]  # rows and columns of the frame
+    colour: np.ndarray  # `[row, column, 3]`, premultiplied
+    opacity: np.ndarray  # `[row, column]`, 0 to 1
 
     def over(self, picture: np.ndarray) -> None:
         """Lays the layer over `picture`, in place."""
@@ -78,15 +66,10 @@ class Layer:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-      picture: `[height, width, 3]`, uint8, BGR.
-      covered: `[object]`, the share of each object's picture that the hand hides.
-    """
-
-    picture: np.ndarray
-    covered: tuple[float, ...]
+    picture: np.ndarray  # `[height, width, 3]`, uint8, BGR
+    covered: tuple[float, ...]  # `[object]`, the share of each object's picture that the hand hides
 
 
 def render_clip(

@@ -12,15 +12,11 @@ Shape = Literal["box", "cylinder", "torus", "sphere"]
 
 @dataclass(frozen=True)
 class Body:
-    """An object as the camera sees it, from the side: a cylinder stands, a torus lies.
+    """An object as the camera sees it, from the side: a cylinder stands, a torus lies."""
 
-    Attributes:
-      shape: box, cylinder, torus or sphere.
-      size_m: box (length along travel, depth, height), cylinder (radius, length), torus
-        (ring radius, tube radius), sphere (radius), m.
-    """
-
-    shape: Shape
+    shape: Shape  # box, cylinder, torus or sphere
+    # box (length along travel, depth, height), cylinder (radius, length), torus (ring radius, tube
+    # radius), sphere (radius), m
     size_m: tuple[float, ...]
 
     @property
