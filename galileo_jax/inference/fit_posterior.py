@@ -3,25 +3,32 @@
 The slopes at the best fit know only what is next to it. Where two events come close to each other
 (bodies that nearly touch again; one that stops as the other passes) the misfit has a corner, and an
 interval from slopes may be five times too narrow. So points round the fit are rolled out and
-weighed by importance (`fits/importance_sampling.py`), and the posterior is drawn from these.
+weighed by importance (`fits/importance_sampling.py`), and the posterior is drawn from these. Where
+few of them have all the weight, or one is better, the fit is not yet the best, and they are near
+that.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.fits.importance_sampling import weighed
-from galileo_jax.inference.fits.posterior_check import MOST_PARAMETERS
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.sized_density import SizedDensity
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
+from galileo_jax.inference.log_posterior import LogPosterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.resampled import resampled
 
-# At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .02 sd.
+MOST_PARAMETERS = 40  # of more, as many trials have, hardly a draw weighs anything
+# Draws at once, and in all until they are worth `ENOUGH` draws: a mean is then good to .02 sd.
 NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 2000.0
+# The same of a look round a fit; a mean is good to a sixth of its sd.
+NUM_LOOKED, MOST_LOOKED, ENOUGH_LOOKED = 256, 1024, 40.0
+NUM_STARTS, BETTER_NATS = 4, 0.5  # a draw beats all fits by so much where these are not the best
 # Worth so few, widths are good to a tenth, and it is said; to a quarter, and slopes know as much.
 FEW, TOO_FEW = 100.0, 10.0
 
@@ -40,19 +47,16 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
     is_quick = all(problem.engine.name == "rigid" for problem in trials.problems)
     if not is_quick or fit.code not in SETTLED or fit.free.sum() > MOST_PARAMETERS:
         return laplace_posterior(trials, fit, seed)
-    valleys = (fit, *fit.beside)
     residuals = Residuals(trials)
-    density = None if fit.sizes is None else SizedDensity(trials, fit, residuals.clips)
-    found = weighed(
-        valleys, residuals, seed, num=NUM_AT_ONCE, most=MOST, enough=ENOUGH, density=density
-    )
+    density = LogPosterior(trials, fit, residuals)
+    valleys = (fit, *fit.beside)
+    found = weighed(valleys, residuals, seed, density, NUM_AT_ONCE, MOST, ENOUGH)
     num_rollouts = fit.stats.get("num_rollouts", 0) + residuals.num_rollouts
     stats = {**fit.stats, "num_rollouts": num_rollouts}
     if found.ess < TOO_FEW:
         normal = laplace_posterior(trials, fit, seed)
         return replace(normal, stats=stats, provenance={**normal.provenance, ESS: found.ess})
-    generator = np.random.default_rng([seed, 31])
-    which = resampled(found.log_weights, NUM_DRAWS, generator)
+    which = resampled(found.log_weights, NUM_DRAWS, np.random.default_rng([seed, 31]))
     return Posterior(
         names=trials.names,
         draws=trials.theta(found.z[which], fit.free)[None],
@@ -61,6 +65,31 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
         stats=stats,
         provenance={"method": "grad", "seed": seed, "code": fit.code.name, ESS: found.ess},
     )
+
+
+def to_go_on_from(
+    trials: JointProblem, fits: Sequence[GradientFit], residuals: Residuals, seed: int
+) -> Float[np.ndarray, "start parameter"]:
+    """Starts, z of the model's parameters; none where the fits describe the posterior.
+
+    Args:
+      trials: that were fitted.
+      fits: the best of each valley, the best first; their sizes of imperfections are the trials'.
+      residuals: of the trials.
+      seed: of the draws.
+    """
+    count = len(fits[0].steps)
+    if fits[0].free.sum() > MOST_PARAMETERS:
+        return np.empty((0, count))
+    density = LogPosterior(trials, replace(fits[0], sizes=None), residuals)
+    found = weighed(fits, residuals, seed, density, NUM_LOOKED, MOST_LOOKED, ENOUGH_LOOKED)
+    at_fits = density(np.stack([fit.z for fit in fits])).max()
+    best, heaviest = np.argmax(found.log_density), np.argsort(-found.log_weights)[:NUM_STARTS]
+    if found.log_density[best] > at_fits + BETTER_NATS:
+        heaviest = np.append(best, heaviest)
+    elif found.ess >= ENOUGH_LOOKED:
+        return np.empty((0, count))
+    return found.z[heaviest, :count]
 
 
 def uncertain_width(posterior: Posterior) -> str | None:

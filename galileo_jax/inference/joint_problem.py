@@ -1,4 +1,4 @@
-"""The joint inverse problem: trials of the same objects, and the density of all parameters.
+"""The joint inverse problem: trials of the same objects, and all their parameters.
 
 The unknowns are `z`, in which every prior is standard normal: first the parameters (those of
 the objects once, those of a trial once per clip), then the logarithm of every clip's noise
@@ -14,14 +14,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import chdtrc
 
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.statespace.term import Term
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
@@ -228,22 +225,3 @@ class JointProblem:
     def noise_scale(self, theta: np.ndarray, clip: int) -> float:
         """The noise scale of one clip."""
         return float(theta[len(self.model_parameters) + clip])
-
-    def log_density(self, z: jax.Array, free: np.ndarray | None = None) -> jax.Array:
-        """The unnormalised posterior density at `z` `[parameter]`; -inf where a rollout failed.
-
-        Args:
-          z: pinned parameters' entries count for the prior and nothing else.
-          free: of a hypothesis; default: all.
-        """
-        theta = self.priors.forward(z)
-        if free is not None:
-            theta = jnp.where(jnp.asarray(free), theta, jnp.asarray(self.absent))
-        total = -0.5 * jnp.sum(z**2)
-        first_noise = len(self.model_parameters)
-        for clip, (problem, column) in enumerate(zip(self.problems, self.columns, strict=True)):
-            predicted = problem.predict(theta[column])
-            total += GaussianLikelihood.log_density(
-                predicted, theta[first_noise + clip], problem.data
-            )
-        return jnp.where(jnp.isfinite(total), total, -jnp.inf)

@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,18 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.transport_map import (
-    Coordinates,
-    Valley,
-    along,
-    learned,
-    scattered,
-    valley_round,
-)
+from galileo_jax.inference.fits.transport_map import Valley, valley_round
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.log_posterior import density_of
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
 from galileo_jax.inference.samplers import sample, sampler_class
@@ -34,6 +26,7 @@ NUM_CHAINS = 8
 # Where the fit's widths are wrong, the warm-up's few draws do not mend them. Whoever has not
 # converged after so many steps knows the posterior well enough to set off anew.
 FIRST_STEPS = 1000
+NUM_SCATTERED = 64  # that starts are chosen from
 
 
 def metropolis_posterior(
@@ -56,7 +49,7 @@ def metropolis_posterior(
     where they are, in coordinates and with proposals that suit it; it alone is returned.
 
     Args:
-      trials: the target is `trials.log_density`, noise scales included; where the fit has sizes of
+      trials: the target is their posterior, noise scales included; where the fit has sizes of
         imperfections, integrated over these.
       fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
@@ -74,75 +67,98 @@ def metropolis_posterior(
       Draws in the parameters' units. Converged when the main parameters that the fit found
       identified, and the mass ratio, have R-hat and ESS as asked for.
     """
-    residuals = Residuals(trials)
+    residuals, key = Residuals(trials), jax.random.key(seed)
     valley = valley_round(fit, residuals)
+    dim = valley.root.shape[1]
+    total = settings.warmup_steps + settings.max_steps
+    watch = _watch(trials, fit)
+
+    def run(
+        valley: Valley, begin: np.ndarray, mean: np.ndarray, covariance: np.ndarray,
+        part: Settings, is_second: bool,
+    ) -> Posterior:  # fmt: skip
+        before, file = 0, checkpoint
+        if is_second:
+            before = total - part.warmup_steps - part.max_steps
+            file = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
+
+        def report(state: Progress) -> None:
+            if on_block is not None:
+                steps = before + state.num_steps
+                on_block(replace(state, num_steps=steps, max_steps=total))
+
+        kernel = sampler_class(sampler)
+        return sample(
+            jax.random.fold_in(key, 1) if is_second else key,
+            kernel.from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),  # pyright: ignore
+            density_of(trials, fit, valley),
+            jnp.asarray(begin),
+            trials.names,
+            settings=part,
+            monitor=lambda w: watch(valley(w)),
+            on_block=report,
+            checkpoint=file,
+            identity=identity,
+        )
+
     if starts is None:
         begin = scattered(valley, fit, residuals, seed, num_chains)
     else:
         begin = valley.straight(starts)
     first, second = _parts(settings)
-    total = settings.warmup_steps + settings.max_steps
-    chains = _Chains(trials, fit, seed, sampler, total, checkpoint, identity, on_block)
-    dim = valley.root.shape[1]
-    at = Coordinates(valley, np.zeros(dim), np.eye(dim))
-    posterior = chains.run(at, begin, first, is_second=False)
+    posterior = run(valley, begin, np.zeros(dim), np.eye(dim), first, False)
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     if second is not None and not posterior.is_converged:
-        u = posterior.draws
-        at = learned(valley, u[:, u.shape[1] // 2 :].reshape(-1, dim))
-        last = u[:, -1]
-        begin = last if at.valley is valley else at.valley.straight(valley(last))
-        posterior = chains.run(at, begin, second, is_second=True)
+        w = posterior.draws
+        before, (valley, *shape) = valley, learned(valley, w[:, w.shape[1] // 2 :].reshape(-1, dim))
+        begin = w[:, -1] if valley is before else valley.straight(before(w[:, -1]))
+        posterior = run(valley, begin, *shape, second, True)
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
-    return posterior.mapped(lambda u: trials.theta(at.valley(u)), trials.names)
+    return posterior.mapped(lambda w: trials.theta(valley(w)), trials.names)
 
 
-@dataclass(frozen=True)
-class _Chains:
-    """What both runs have in common, as `metropolis_posterior` has it; `total`: steps of both."""
+def learned(valley: Valley, w: np.ndarray) -> tuple[Valley, np.ndarray, np.ndarray]:
+    """Coordinates that suit draws, and the draws' mean and covariance in them.
 
-    trials: JointProblem
-    fit: GradientFit
-    seed: int
-    sampler: str
-    total: int
-    checkpoint: Path | None
-    identity: str
-    on_block: Callable[[Progress], None] | None
+    The valley's own; or straight ones, if in these a normal density comes closer to the draws: a
+    fit whose widths are wrong, at a kink of the misfit, has wrong bends, too. The determinants are
+    constant, so that those of the covariances compare.
 
-    def run(self, at: Coordinates, begin: np.ndarray, part: Settings, is_second: bool) -> Posterior:
-        """One of them, from `begin` in coordinates `at`."""
-        before = self.total - part.warmup_steps - part.max_steps if is_second else 0
-
-        def report(state: Progress) -> None:
-            assert self.on_block is not None
-            whole = replace(state, num_steps=before + state.num_steps, max_steps=self.total)
-            self.on_block(whole)
-
-        kernel, key = sampler_class(self.sampler), jax.random.key(self.seed)
-        file = self.checkpoint
-        if file is not None and is_second:
-            file = file.with_name(f"{file.name}.second")
-        mean, covariance = jnp.asarray(at.mean), jnp.asarray(at.covariance)
-        return sample(
-            jax.random.fold_in(key, 1) if is_second else key,
-            kernel.from_gaussian(mean, covariance),  # pyright: ignore
-            along(density_of(self.trials, self.fit), at.valley),
-            jnp.asarray(begin),
-            self.trials.names,
-            settings=part,
-            monitor=partial(_watch(self.trials, self.fit), at.valley),
-            on_block=report if self.on_block else None,
-            checkpoint=file,
-            identity=self.identity,
-        )
+    Args:
+      valley: in whose coordinates the draws were made.
+      w: `[draw, parameter]`.
+    """
+    z = valley(w)
+    bent, straight = np.cov(w, rowvar=False), np.cov(z, rowvar=False)
+    size = np.linalg.slogdet(bent)[1] + 2 * valley.log_volume
+    if size <= np.linalg.slogdet(straight)[1]:
+        return valley, w.mean(axis=0), bent
+    dim = len(straight)
+    none, axes = np.zeros((dim, dim)), np.eye(dim)
+    unbent = Valley(z.mean(axis=0), np.linalg.cholesky(straight), axes, none, none)
+    return unbent, np.zeros(dim), axes
 
 
-def _watch(
-    trials: JointProblem, fit: GradientFit
-) -> Callable[[Valley, np.ndarray], dict[str, np.ndarray]]:
-    """Draws `[chain, draw, dim]` along a valley to what must converge: what the fit tells."""
+def scattered(
+    valley: Valley, fit: GradientFit, residuals: Residuals, seed: int, num: int
+) -> np.ndarray:
+    """Starts for chains, `[chain, parameter]`, in w; wider than the posterior, as R-hat asks.
+
+    Drawn from the density to the power 1/2, by importance from N(0, 2): where the map leads
+    astray, far off, none is left.
+    """
+    size = int(np.sum(fit.free[: len(fit.steps)]))
+    generator = np.random.default_rng([seed, 10])
+    w = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), valley.root.shape[1]))
+    costs = residuals.costs(fit.points(valley(w)))
+    surplus = 0.25 * np.sum(w[:, :size] ** 2, axis=1) - 0.5 * costs
+    # The largest of log-weights with Gumbel noise: a draw without replacement.
+    return w[np.argsort(-(surplus + generator.gumbel(size=len(w))))[:num]]
+
+
+def _watch(trials: JointProblem, fit: GradientFit) -> Callable[[np.ndarray], dict[str, np.ndarray]]:
+    """Draws `[chain, draw, dim]`, z, to what must converge: what the fit tells."""
     sd = np.sqrt(np.diag(fit.covariance))
     told = [
         (i, parameter.name)
@@ -151,8 +167,7 @@ def _watch(
     ]
     masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
 
-    def watch(valley: Valley, u: np.ndarray) -> dict[str, np.ndarray]:
-        draws = valley(u)
+    def watch(draws: np.ndarray) -> dict[str, np.ndarray]:
         found = {name: draws[..., i] for i, name in told}
         for i, (one, other) in enumerate(pairwise(masses), 1):
             found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]

@@ -139,6 +139,8 @@ class Problem:
 
     def with_sizes(self, sizes: Mapping[str, float] | None) -> "Problem":
         """The same with other sizes of imperfections; what they are made of is not made again."""
+        if sizes == self.sizes:
+            return self
         other = replace(self, sizes=sizes)
         for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
             other.__dict__[name] = getattr(self, name)

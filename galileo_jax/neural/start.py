@@ -12,7 +12,7 @@ Source: J. Wu et al., Galileo: perceiving physical object properties by integrat
 engine with deep learning, NIPS 2015, section 5.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -51,11 +51,8 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     free = trials.free(())[: len(trials.model_parameters)]
     fitter = GradientFitter(trials)
     (fit,) = fitter.fit_from(middle[None, : len(free)], free[None], np.zeros(1, int))
-    spent = fit.stats["num_rollouts"]
     # A small coefficient of restitution has a valley on either side; the network knows of neither.
     fit = refit(fitter, fit)
-    stats = {**fit.stats, "num_rollouts": fit.stats["num_rollouts"] + spent}
-    fit = replace(fit, stats=stats)
     generator = np.random.default_rng([seed, 8])
     drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
     known = np.array([parameter.role == "main" for parameter in trials.parameters])

@@ -3,7 +3,7 @@
 From a single distant start a descent usually ends in a side valley, because the time of a hit
 decides which frames are compared with which. So the moves scatter starts, jolt the fit across rims,
 and, where it is in doubt, look phase by phase and on all sides. What has come to rest then looks
-round itself (`posterior_check`).
+round itself (`to_go_on_from`).
 """
 
 import functools
@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from galileo_jax.inference.fit_posterior import to_go_on_from
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
-from galileo_jax.inference.fits.posterior_check import to_go_on_from
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
@@ -41,7 +41,6 @@ def best_fit(
       is_enough: of what was found, whether more starts are spared; default: whether noise explains
         what it leaves.
     """
-    fitter.residuals.num_rollouts = 0
     trials = fitter.trials
     mask = trials.free(trials.all_effects if effects is None else effects)
 
@@ -59,7 +58,6 @@ def best_fit(
 
 def refit(fitter: GradientFitter, fit: GradientFit) -> GradientFit:
     """The best of a fit gone on from and of those with its positive nuisances moved."""
-    fitter.residuals.num_rollouts = 0
     start = Start((), fit.z[: len(fit.steps)], None, "refit", is_near=True)
     table = _empty(fitter, 0, fit.free)
     return search(table, 0, starts=[start], moves=[jolt.propose]).base.fit
@@ -83,7 +81,7 @@ def looked_round(table: Table) -> tuple[Table, GradientFit]:
     fitter = table.fitter
     fit = fitter.at_rest(table.entries[BASE].fits)
     for _ in range(NUM_LOOKS if fitter.is_smooth else 0):
-        starts = to_go_on_from((fit, *fit.beside), fitter.residuals, table.seed)
+        starts = to_go_on_from(fitter.trials, (fit, *fit.beside), fitter.residuals, table.seed)
         if not len(starts):
             break
         base = Hypothesis((), fit)

@@ -153,7 +153,7 @@ def _forget_unshared_programs(found: "Fit") -> None:
     """Frees compiled chains that no other clip can use: a worker would fill up with them."""
     import jax
 
-    from galileo_jax.inference.density import density_of
+    from galileo_jax.inference.log_posterior import density_of
     from galileo_jax.inference.samplers.program import Program
 
     is_sampled = found.result["method"] == "mh"

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference import fit_posterior as module
-from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
+from galileo_jax.inference.fit_posterior import fit_posterior, to_go_on_from, uncertain_width
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.laplace import Code
-from galileo_jax.inference.fits.posterior_check import to_go_on_from
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Status
 from galileo_jax.search.fit import best_fit
@@ -45,10 +44,27 @@ class Trials:
         return np.where(free, z, 0.0)
 
 
+def of_known(monkeypatch, known):
+    """Residuals and log posterior of whatever trials are those of `known`."""
+    monkeypatch.setattr(module, "Residuals", lambda trials: known)
+    density = lambda *_: lambda z: -known.costs(points(z))  # noqa: E731
+    monkeypatch.setattr(module, "LogPosterior", density)
+
+
+@pytest.fixture
+def goes_on_from(monkeypatch):
+    def of(known, fit):
+        of_known(monkeypatch, known)
+        trials: Any = Trials()
+        return to_go_on_from(trials, [fit], known, 0)
+
+    return of
+
+
 @pytest.fixture
 def posterior(monkeypatch):
     def of(known, fit, seed=0, engine="rigid"):
-        monkeypatch.setattr(module, "Residuals", lambda trials: known)
+        of_known(monkeypatch, known)
         trials: Any = Trials(engine)
         return fit_posterior(trials, fit, seed), laplace_posterior(trials, fit, seed)
 
@@ -136,23 +152,26 @@ def test_of_a_simulated_hit_both_agree():
         assert found[:, i].mean() == pytest.approx(normal[:, i].mean(), abs=0.2 * sd)
 
 
-def test_a_fit_that_describes_the_posterior_leads_nowhere():
+def test_a_fit_that_describes_the_posterior_leads_nowhere(goes_on_from):
     known: Any = Known(lambda a, b: ((a - 1) / 0.1, (b + 0.5) / 0.3))
-    fit = known.fit((1 / 1.01, -0.5 / 1.09))
-    assert to_go_on_from([fit], known, 0).shape == (0, 2)
+    assert goes_on_from(known, known.fit((1 / 1.01, -0.5 / 1.09))).shape == (0, 2)
+    assert goes_on_from(BENT, BENT.best((0.3, 0.1))).shape == (0, 2)
 
 
-def test_from_beside_the_best_it_goes_on_to_the_best():
-    """Two valleys, the second one deeper and next to the fit's."""
+def test_from_beside_the_best_it_goes_on_to_the_best(goes_on_from):
+    """Two valleys, the second one deeper and next to the fit's; and one that was not fitted."""
     known: Any = Known(lambda a, b: ((a**2 - 0.09) / 0.06, (b - 3 * a + 0.9) / 0.6))
     beside, best = known.best((-0.3, -1.0)), known.best((0.3, 0.0))
     assert best.log_evidence > beside.log_evidence + 0.5
-    starts = to_go_on_from([beside], known, 0)
+    starts = goes_on_from(known, beside)
     costs = known.costs(points(starts))
     assert costs.min() < known.costs(points(beside.z))[0]
     assert starts[np.argmin(costs), 0] > 0
+    beside = BENT.fit((1.0, 1.3))
+    better = goes_on_from(BENT, beside)[0]
+    assert BENT.costs(points(better))[0] < BENT.costs(points(beside.z))[0] - 0.5
 
 
-def test_so_many_parameters_that_no_draw_weighs_anything_are_left(monkeypatch):
-    monkeypatch.setattr("galileo_jax.inference.fits.posterior_check.MOST_PARAMETERS", 1)
-    assert to_go_on_from([AT_THE_CORNER], CORNER, 0).shape == (0, 2)
+def test_so_many_parameters_that_no_draw_weighs_anything_are_left(goes_on_from, monkeypatch):
+    monkeypatch.setattr(module, "MOST_PARAMETERS", 1)
+    assert goes_on_from(CORNER, AT_THE_CORNER).shape == (0, 2)

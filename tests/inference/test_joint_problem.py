@@ -10,6 +10,7 @@ import pytest
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
+from galileo_jax.inference.log_posterior import density_of
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import Uniform
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -45,6 +46,10 @@ def draw(trials, seed=0):
     for name, value in (("k1", -1.2), ("k2", -0.8)):
         z[trials.names.index(name)] = value
     return z
+
+
+def log_density(trials, z):
+    return float(density_of(trials)(jnp.asarray(z)))
 
 
 def test_objects_are_shared_and_trials_are_not(library):
@@ -89,51 +94,51 @@ def test_a_hypothesis_pins_the_others_effects(library):
         library.free(("stribeck",))
 
 
+def log_density_by_hand(trials, z, predicted):
+    theta, total = trials.theta(np.asarray(z)), -0.5 * float(z @ z)
+    for clip, problem in enumerate(trials.problems):
+        noise = np.exp(NOISE_SD * z[len(trials.model_parameters) + clip])
+        assert trials.noise_scale(theta, clip) == pytest.approx(noise, rel=SAME)
+        total += float(GaussianLikelihood.log_density(predicted[clip], noise, problem.data))
+    return total
+
+
 @pytest.mark.parametrize("noise_z", [-0.7, 0.0, 1.3])
 def test_log_density_by_hand(base, noise_z):
     z = draw(base)
     z[-2:] = noise_z, 0.4
     theta = base.theta(z)
-    by_hand = -0.5 * float(z @ z)
-    for clip, problem in enumerate(base.problems):
-        own = base.of_clip(theta, clip)
-        noise = np.exp(NOISE_SD * z[len(base.model_parameters) + clip])
-        assert base.noise_scale(theta, clip) == pytest.approx(noise, rel=SAME)
-        predicted = problem.simulate(own)
-        by_hand += float(GaussianLikelihood.log_density(predicted, noise, problem.data))
-    assert float(base.log_density(jnp.asarray(z))) == pytest.approx(by_hand, rel=BETWEEN_PROGRAMS)
+    predicted = [p.simulate(base.of_clip(theta, clip)) for clip, p in enumerate(base.problems)]
+    by_hand = log_density_by_hand(base, z, predicted)
+    assert log_density(base, z) == pytest.approx(by_hand, rel=BETWEEN_PROGRAMS)
 
 
 def test_clips_are_independent_given_the_objects(base):
     """The joint density is the clips' product; the shared prior counts once."""
     z = draw(base)
-    parts = [
-        float(base.alone(clip).log_density(jnp.asarray(z[base.columns_of(clip)])))
-        for clip in (0, 1)
-    ]
+    parts = [log_density(base.alone(clip), z[base.columns_of(clip)]) for clip in (0, 1)]
     shared = np.intersect1d(base.columns[0], base.columns[1])
     assert [base.names[i] for i in shared] == ["m1", "k1", "m2", "k2"]
     twice = -0.5 * float(np.sum(z[shared] ** 2))
-    joint = float(base.log_density(jnp.asarray(z)))
-    assert joint == pytest.approx(sum(parts) - twice, rel=BETWEEN_PROGRAMS)
+    assert log_density(base, z) == pytest.approx(sum(parts) - twice, rel=BETWEEN_PROGRAMS)
 
 
 def test_all_effects_pinned_is_the_base_model(base, library):
     free = library.free(())
-    z_base = draw(base)
     z = np.zeros(len(library.names))
-    z[free] = z_base
-    assert [n for n, is_free in zip(library.names, free, strict=True) if is_free] == list(
-        base.names
-    )
-    expected = float(base.log_density(jnp.asarray(z_base)))
-    pinned = float(library.log_density(jnp.asarray(z), free))
-    assert pinned == pytest.approx(expected, rel=BETWEEN_PROGRAMS)
-    # Pinned entries count for the prior and nothing else.
-    z[~free] = 1.0
-    moved = float(library.log_density(jnp.asarray(z), free))
-    assert moved - pinned == pytest.approx(-0.5 * np.sum(~free), rel=1e-6)
-    assert float(library.log_density(jnp.asarray(z))) != pytest.approx(moved, abs=1.0)
+    z[free] = draw(base)
+    names = [n for n, is_free in zip(library.names, free, strict=True) if is_free]
+    assert names == list(base.names)
+    costs = [
+        Residuals(trials).costs(batch(trials, own, is_free))[0]
+        for trials, own, is_free in ((base, z[free], free[free]), (library, z, free))
+    ]
+    assert costs[0] == pytest.approx(costs[1], rel=BETWEEN_PROGRAMS)
+
+
+def batch(trials, z, free):
+    count = len(trials.model_parameters)
+    return Batch(z[None, :count], free[None, :count], np.ones((1, len(trials.problems))))
 
 
 def test_a_place_is_the_same_in_all_clips():
@@ -150,9 +155,7 @@ def test_a_place_is_the_same_in_all_clips():
     z = draw(trials)
     z[trials.names.index("friction_patch")] = 1.0
     z[where] = 0.4
-    count = len(trials.model_parameters)
-    points = Batch(z[None, :count], np.ones((1, count), bool), np.ones((1, 2)))
-    found = Residuals(trials).whites(points)
+    found = Residuals(trials).whites(batch(trials, z, np.ones(len(z), bool)))
     expected = whitened(trials, trials.theta(z)[None], np.ones(2))
     for own, joint in zip(found, expected, strict=True):
         assert np.sum(own**2) == pytest.approx(np.sum(joint**2), rel=BETWEEN_PROGRAMS)

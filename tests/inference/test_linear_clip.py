@@ -1,11 +1,12 @@
 """Sizes of imperfections in the linear model: against sums over a grid, and dense algebra."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import logsumexp as scipy_logsumexp
 
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.importance_sampling import _log_densities
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import (
     LinearClip,
@@ -14,8 +15,9 @@ from galileo_jax.inference.fits.linear_clip import (
     log_likelihood,
     most_probable,
 )
-from galileo_jax.inference.fits.sized_density import SizedDensity
+from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
+from galileo_jax.inference.log_posterior import LogPosterior
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import fit_worlds
@@ -105,19 +107,22 @@ def test_the_likelihood_of_sizes_integrates_the_noise(clip):
 @in_float64
 def test_the_density_over_one_size_is_that_of_the_fit():
     """Up to a constant; so what is integrated is the likelihood itself, no linear model of it."""
-    trials = make_trials([HIT])
-    world = fit_worlds(trials, 0, may_be_exact=False).best
-    fit, sized = world.fit, world.trials
+    world = fit_worlds(make_trials([HIT]), 0, may_be_exact=False).best
+    fit, residuals = world.fit, Residuals(world.trials)
     assert fit.sizes is not None
     at_mode = np.concatenate([fit.sizes.x, np.zeros(1)])[None]
     object.__setattr__(fit.sizes, "draws", at_mode)
-    fitter = GradientFitter(sized)
-    density = SizedDensity(sized, fit, fitter.residuals.clips)
     rng = np.random.default_rng(0)
-    spread = np.sqrt(np.diag(fit.covariance))
-    z = fit.z + 0.7 * spread * rng.standard_normal((12, len(fit.z)))
-    apart = density(z) - _log_densities(fit, fitter.residuals, z)
-    np.testing.assert_allclose(apart, apart[0], atol=1e-6)
+    z = fit.z + 0.7 * np.sqrt(np.diag(fit.covariance)) * rng.standard_normal((12, len(fit.z)))
+    over_one, at_fit = (
+        LogPosterior(world.trials, one, residuals)(z) for one in (fit, replace(fit, sizes=None))
+    )
+    np.testing.assert_allclose(over_one - at_fit, over_one[0] - at_fit[0], atol=1e-6)
+    z[:, -1] = fit.z[-1]  # the noise of the fit
+    costs = residuals.costs(fit.points(z))
+    np.testing.assert_allclose(
+        np.ptp(costs + LogPosterior(world.trials, fit, residuals)(z)), 0.0, atol=1e-4
+    )
 
 
 def test_many_rows_are_averaged_and_say_the_same_of_parameters():

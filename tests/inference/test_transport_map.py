@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference import metropolis
-from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.transport_map import (
-    Valley,
-    along,
-    learned,
-    scattered,
-    valley_round,
-)
-from galileo_jax.inference.metropolis import metropolis_posterior
+from galileo_jax.inference.fits.transport_map import Valley, valley_round
+from galileo_jax.inference.log_posterior import density_of
+from galileo_jax.inference.metropolis import learned, metropolis_posterior, scattered
 from galileo_jax.inference.samplers import Settings
-from galileo_jax.inference.samplers.program import Program
 from galileo_jax.search.fit import best_fit
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -73,7 +66,7 @@ def test_shapes_and_both_kinds_of_arrays():
 
 def nats_lost(trials, valley, u):
     """How far the log density is below the mode's, `[point]`; u^2 / 2 where it is normal."""
-    density = along(density_of(trials), jax.tree.map(jnp.asarray, valley))
+    density = density_of(trials, valley=valley)
     values = np.asarray(jax.vmap(density)(jnp.asarray(np.vstack([np.zeros(u.shape[1]), u]))))
     return values[0] - values[1:]
 
@@ -115,22 +108,12 @@ def test_starts_are_wider_than_the_posterior_and_in_it(gentle):
     np.testing.assert_array_equal(u, again)
 
 
-def test_other_densities_go_along_it_too(gentle):
-    trials, _, _, valley = gentle
-    program = along(density_of(trials), valley)
-    closure = along(trials.log_density, valley)
-    assert isinstance(program, Program)
-    assert not isinstance(closure, Program)
-    u = jnp.asarray(np.random.default_rng(4).standard_normal(len(trials.names)))
-    assert float(program(u)) == pytest.approx(float(closure(u)), rel=1e-6)
-
-
 def test_draws_that_a_valley_suits_keep_it():
     valley, generator = any_valley(), np.random.default_rng(5)
     u = generator.standard_normal((2000, DIM))
-    kept = learned(valley, u)
-    assert kept.valley is valley
-    np.testing.assert_allclose(kept.covariance, np.eye(DIM), atol=0.15)
+    kept, _, covariance = learned(valley, u)
+    assert kept is valley
+    np.testing.assert_allclose(covariance, np.eye(DIM), atol=0.15)
 
 
 def test_draws_of_another_shape_get_coordinates_of_their_own():
@@ -141,12 +124,12 @@ def test_draws_of_another_shape_get_coordinates_of_their_own():
     z = valley.mode + 3.0 * generator.standard_normal((2000, DIM)) @ valley.root.T
     bent = np.array([u_of(valley, one) for one in unbent.straight(z)])
     np.testing.assert_allclose(valley(bent), z, atol=1e-6)
-    found = learned(valley, bent)
-    assert not found.valley.quadratic.any()
-    assert not found.valley.cubic.any()
-    own = found.valley.straight(z)
-    np.testing.assert_allclose(own.mean(axis=0), found.mean, atol=1e-9)
-    np.testing.assert_allclose(np.cov(own, rowvar=False), found.covariance, atol=1e-9)
+    found, mean, covariance = learned(valley, bent)
+    assert not found.quadratic.any()
+    assert not found.cubic.any()
+    own = found.straight(z)
+    np.testing.assert_allclose(own.mean(axis=0), mean, atol=1e-9)
+    np.testing.assert_allclose(np.cov(own, rowvar=False), covariance, atol=1e-9)
 
 
 def u_of(valley, straight):
@@ -194,15 +177,14 @@ def test_chains_converge_in_it(gentle):
 
 def test_the_way_back_and_of_a_pinned_parameter_there_is_none():
     valley, u = any_valley(), np.random.default_rng(5).standard_normal((20, DIM))
-    every = np.ones(DIM, bool)
-    np.testing.assert_allclose(valley.inverse(valley(u), every), u, atol=1e-6)
+    np.testing.assert_allclose(valley.inverse(valley(u)), u, atol=1e-6)
     assert valley.log_volume == pytest.approx(np.linalg.slogdet(valley.root)[1])
     # The same with a parameter more, which is held at 7.
     wider = replace(
         valley, mode=np.append(valley.mode, 7.0), root=np.vstack([valley.root, np.zeros(DIM)])
     )
     assert np.all(wider(u)[:, -1] == 7.0)
-    np.testing.assert_allclose(wider.inverse(wider(u), np.append(every, False)), u, atol=1e-6)
+    np.testing.assert_allclose(wider.inverse(wider(u)), u, atol=1e-6)
     assert wider.log_volume == pytest.approx(valley.log_volume)
 
 

@@ -25,13 +25,12 @@ from galileo_jax.inference.fits.descent import BEHIND_IN_SEARCH, Descended, Desc
 from galileo_jax.inference.fits.distinct_modes import apart
 from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
-from galileo_jax.inference.fits.laplace import laplace_fits
+from galileo_jax.inference.fits.laplace import laplace_fits, points_of
 from galileo_jax.inference.fits.refine import BEHIND as BEHIND
 from galileo_jax.inference.fits.refine import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import (
     NOISE_SCALE_RANGE,
-    NOISE_SD,
     JointProblem,
     noise_explains,
 )
@@ -107,12 +106,8 @@ class GradientFitter:
           fit: with the sizes of before.
           to_rest: whether it goes on until it stands still.
         """
-        self._residuals.num_rollouts = 0
-        every, count = (fit, *fit.beside), self._count
-        z = np.stack([one.z for one in every])
-        free = np.stack([one.free[:count] for one in every])
-        points = Batch(z[:, :count], free, np.exp(NOISE_SD * z[:, count:]))
-        ends = list(self._polish(points, np.zeros(len(every), int))[0].values())
+        points = points_of((fit, *fit.beside))
+        ends = list(self._polish(points, np.zeros(len(points.z), int))[0].values())
         found = self.at_rest(ends) if to_rest else _with_beside(ends)
         if found.code is Code.CONVERGED and not self.is_explained(found, NOISE_SCALE_RANGE[1]):
             return replace(found, code=Code.MISFIT)
@@ -134,7 +129,6 @@ class GradientFitter:
         Returns:
           One fit per hypothesis, of its best start.
         """
-        self._residuals.num_rollouts = 0
         points = self._batch(starts, free)
         give_up = GiveUp(owner, BEHIND_IN_SEARCH)
         found = self._descent(points, ENOUGH_NATS, MOST_STEPS, give_up)
@@ -211,8 +205,7 @@ class GradientFitter:
         self, fit: GradientFit, z: Float[np.ndarray, "point parameter"]
     ) -> Float[np.ndarray, " point"]:
         """chi2 / 2 and the prior's part of other points, with a fit's own noise and parameters."""
-        noise = np.tile(np.exp(NOISE_SD * fit.z[self._count :]), (len(z), 1))
-        return self._residuals.costs(Batch(z, np.tile(fit.free[: self._count], (len(z), 1)), noise))
+        return self._residuals.costs(fit.points(z))
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
@@ -235,14 +228,8 @@ class GradientFitter:
         fit = _with_beside(found)
         if not self.is_smooth or fit.code is not Code.CONVERGED:
             return fit
-        fits, count = (fit, *fit.beside), self._count
-        z = np.stack([one.z for one in fits])
-        points = Batch(
-            z[:, :count],
-            np.stack([one.free[:count] for one in fits]),
-            np.exp(NOISE_SD * z[:, count:]),
-        )
-        descent, owner = replace(self._descent, is_central=True), np.arange(len(fits))
+        points = points_of((fit, *fit.beside))
+        descent, owner = replace(self._descent, is_central=True), np.arange(len(points.z))
         modes = polish(descent, points, owner, STILL_NATS, MOST_POLISH_STEPS, drift=STILL)
         still = laplace_fits(self.trials, self._residuals, modes)
         return _with_beside([replace(one, code=Code.CONVERGED) for one in still])

@@ -1,145 +1,118 @@
 """Weighed draws of a posterior: rollouts round the fit, each with its weight by importance.
 
-    w_i = p(z_i) / q(z_i),    z_i ~ q
+    w_i = p(z_i) / sum_k share_k q_k(z_i),    z_i of any of the q_k
 
 Where the posterior is normal, all weights are alike. Where it is skewed, bent or cut off by the end
 of a prior, they are not, and with their weights the draws are of the posterior all the same.
 
-q has a part for each valley that was found: Student's t along it (`transport_map.py`), so that
-valleys add up and do not count twice where they overlap. One that bends too much for that has a
-second part, which follows its ridge (`profile_proposal.py`).
-
-Where few draws count all the same, further ones learn from them (`adaptive_mixture.py`).
+For each valley that was found there is a Student's t along it (`transport_map.py`), so that valleys
+add up and do not count twice where they overlap; one that bends too much for that has a second
+part, which follows its ridge (`profile_proposal.py`). Half of all draws after the first ones are
+from a t that fits those before, a new one every time. Every draw is weighed by all that drew.
 
 Source: J. Geweke, Bayesian inference in econometric models using Monte Carlo integration,
-Econometrica 57 (1989), 1317 (the t).
+Econometrica 57 (1989), 1317 (the t); A. B. Owen, Monte Carlo theory, methods and examples (2013),
+ch. 9 (mixtures); J. Cornuet, J.-M. Marin, A. Mira, C. P. Robert, Adaptive multiple importance
+sampling, Scand. J. Stat. 39 (2012), 798.
 """
 
-import functools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.adaptive_mixture import AdaptiveMixture, Part
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.profile_proposal import bent_direction, ridge_along
-from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.t_proposal import log_student_t, student_t
-from galileo_jax.inference.fits.transport_map import Valley, valley_round
-from galileo_jax.inference.joint_problem import NOISE_SD
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.inference.fits.profile_proposal import ridge_along
+from galileo_jax.inference.fits.residuals import Residuals
+from galileo_jax.inference.fits.t_proposal import Cloud, Points, Proposal, Values
+from galileo_jax.inference.fits.transport_map import valley_round
 
-NUM_DRAWS, MOST_DRAWS = 256, 1536  # at once, and in all where few of them count
-ENOUGH_ESS = 40.0  # a mean is good to a sixth of its sd
-BETTER_NATS = 0.5  # by which a draw beats all fits where these are not at their best
+SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
 SHARE_RIDGE = 0.75  # of a valley's draws, where it bends too much
 
 
-@dataclass(frozen=True)
-class Weighed:
-    """Weighed draws of a posterior.
+class WeighedDraws:
+    """Draws, and their weights for a density that is told after each batch of them.
 
     Attributes:
-      log_weights: `[draw]`.
-      ess: how many draws of the posterior itself these are worth.
       z: `[draw, parameter]`.
-      log_density: `[draw]`, of the posterior, up to a constant.
-      better: `[parameter]`, z of a draw that is more probable than all fits; None: none is.
+      log_weights: `[draw]`; each by the mixture of all that have drawn.
+      log_density: `[draw]`, of what they are weighed for.
+      ess: how many draws of the posterior itself these are worth.
     """
 
-    log_weights: Float[np.ndarray, " draw"]
-    ess: float
-    z: Float[np.ndarray, "draw parameter"]
-    log_density: Float[np.ndarray, " draw"]
-    better: Float[np.ndarray, " parameter"] | None = None
+    def __init__(
+        self,
+        proposals: Sequence[Proposal],
+        shares: Float[np.ndarray, " proposal"],
+        free: Bool[np.ndarray, " parameter"],
+    ):
+        """`shares`: of the first draws; `free`: the parameters that are drawn."""
+        self._proposals, self._shares, self._free = list(proposals), shares, free
+        self.z, self.log_weights, self.ess = np.empty((0, len(free))), np.empty(0), 0.0
+        self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
 
+    def draw(self, generator: np.random.Generator, num: int) -> Points:
+        """Further draws."""
+        which, shares = np.arange(len(self._shares)), self._shares
+        if self.log_density.size:
+            which = np.append(which, len(self._proposals))
+            self._proposals.append(Cloud.of(self.z, self.log_weights, self._free))
+            shares = np.append((1 - SHARE_ADAPTED) * shares, SHARE_ADAPTED)
+        counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
+        each = zip(which, counts, strict=True)
+        drawn = [self._proposals[k].draw(generator, int(n)) for k, n in each]
+        new, own = (np.concatenate(values) for values in zip(*drawn, strict=True))
+        self.z = np.concatenate([self.z, new])
+        self._own = np.append(self._own, own)
+        self._of = np.append(self._of, np.repeat(which, counts))
+        return new
 
-@dataclass(frozen=True)
-class _AlongValley:
-    """A part of q: a t along a valley."""
-
-    valley: Valley
-    free: np.ndarray  # [parameter], which are moved
-
-    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
-        """Points, and their log density in this part."""
-        u = student_t(generator, num, self.valley.root.shape[1])
-        return np.array(self.valley(u)), self._log_density_at(u)
-
-    def log_density(self, z: np.ndarray) -> np.ndarray:
-        with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
-            u = self.valley.inverse(z, self.free)
-        return self._log_density_at(u)
-
-    def _log_density_at(self, u: np.ndarray) -> np.ndarray:
-        with np.errstate(over="ignore", invalid="ignore"):
-            far = np.nan_to_num(np.sum(u**2, axis=1), nan=np.inf)
-        return log_student_t(far, u.shape[1]) - self.valley.log_volume
+    def add(self, log_p: Values) -> None:
+        """The log density of the draws made last: all are weighed anew."""
+        self.log_density = np.append(self.log_density, log_p)
+        log_q = np.stack([one.log_density(self.z) for one in self._proposals])
+        # A valley that bends much takes a draw so far that no map finds its way back from there.
+        log_q[self._of, np.arange(len(self.z))] = self._own
+        shares = np.bincount(self._of, minlength=len(log_q)) / len(self.z)
+        mixture = np.asarray(logsumexp(log_q, axis=0, b=shares[:, None]))
+        self.log_weights = self.log_density - mixture
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
 
 
 def weighed(
     fits: Sequence[GradientFit],
     residuals: Residuals,
     seed: int,
-    num: int = NUM_DRAWS,
-    most: int = MOST_DRAWS,
-    enough: float = ENOUGH_ESS,
-    density: Callable[[np.ndarray], np.ndarray] | None = None,
-) -> Weighed:
+    density: Callable[[np.ndarray], np.ndarray],
+    num: int,
+    most: int,
+    enough: float,
+) -> WeighedDraws:
     """Weighed draws of the posterior of a hypothesis.
 
     Args:
       fits: of the hypothesis, the best of each valley.
       residuals: of the trials that were fitted.
       seed: same seed, same draws.
+      density: its logarithm at `[point, parameter]`, up to a constant.
       num: of draws at once, a rollout each.
       most: of draws in all; more than `num` only while too few of them count.
       enough: draws of the posterior itself that they must be worth.
-      density: of likelihood times exp(-z.z / 2), its logarithm at `[point, parameter]`, up to a
-        constant; default: at the sizes of imperfections that were fitted with.
     """
-    fit, generator = fits[0], np.random.default_rng([seed, 23])
-    density = density or functools.partial(_log_densities, fit, residuals)
-    parts, shares = _parts(fits, residuals)
-    # The prior's constant; that of the data is the same for all hypotheses.
-    constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
-    modes = np.stack([one.z for one in fits])
-    best, better, made = -np.inf, None, AdaptiveMixture(parts, shares, fit.free)
-    while len(made.z) < num or (made.ess < enough and len(made.z) < most):
-        new = made.draw(generator, num)
-        both = density(np.concatenate([new, modes]))
-        made.add(both[:num] - constant)
-        best = max(best, both[num:].max() + BETTER_NATS)
-        if both[:num].max() > best:
-            best, better = float(both[:num].max()), new[np.argmax(both[:num])]
-    return Weighed(made.log_weights, made.ess, made.z, made.log_density, better)
-
-
-def _parts(fits: Sequence[GradientFit], residuals: Residuals) -> tuple[list[Part], np.ndarray]:
-    """Those of the valleys, and which shares of the draws they have."""
-    parts, shares = list[Part](), list[float]()
-    for one in fits:
-        part = _AlongValley(valley_round(one, residuals), one.free)
-        parts.append(part)
+    proposals, shares = list[Proposal](), list[float]()
+    for fit in fits:
+        valley = valley_round(fit, residuals)
+        proposals.append(valley)
         shares.append(1 / len(fits))
-        direction = bent_direction(part.valley)
-        ridge = None if direction is None else ridge_along(one, part.valley, direction, residuals)
+        ridge = ridge_along(fit, valley, residuals)
         if ridge is not None:
-            parts.append(ridge)
+            proposals.append(ridge)
             shares[-1:] = [(1 - SHARE_RIDGE) * shares[-1], SHARE_RIDGE * shares[-1]]
-    return parts, np.array(shares)
-
-
-def _log_densities(fit: GradientFit, residuals: Residuals, z: np.ndarray) -> np.ndarray:
-    """Of likelihood times exp(-z.z / 2), noise scales being free, `[point]`."""
-    count = len(fit.steps)
-    noise = np.exp(NOISE_SD * z[:, count:])
-    free = np.broadcast_to(fit.free[:count], (len(z), count))
-    found = -residuals.costs(Batch(z[:, :count], free, noise))
-    found = found - 0.5 * np.sum(z[:, count:] ** 2, axis=1)
-    for clip, scales in zip(residuals.clips, noise.T, strict=True):
-        data = clip.data.whitening
-        found -= 0.5 * np.array([GaussianLikelihood.log_determinant(s, data) for s in scales])
-    return found
+    made = WeighedDraws(proposals, np.array(shares), fits[0].free)
+    generator = np.random.default_rng([seed, 23])
+    while len(made.z) < num or (made.ess < enough and len(made.z) < most):
+        made.add(density(made.draw(generator, num)))
+    return made

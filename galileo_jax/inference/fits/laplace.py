@@ -1,5 +1,6 @@
 """What a fit is, and Laplace's approximation round it: covariance and evidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,7 +10,7 @@ from jaxtyping import Bool, Float
 from galileo_jax.inference.fits.kernels import FAILED
 from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.refine import Polished
-from galileo_jax.inference.fits.residuals import Residuals, Slopes, cost, quadratic
+from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -66,6 +67,13 @@ class GradientFit:
     beside: tuple["GradientFit", ...] = ()
     sizes: Sizes | None = None
 
+    def points(self, z: Float[np.ndarray, "point parameter"]) -> Batch:
+        """Points with this fit's own noise and parameters."""
+        count = len(self.steps)
+        free = np.broadcast_to(self.free[:count], (len(z), count))
+        noise = np.exp(NOISE_SD * self.z[count:])
+        return Batch(z[:, :count], free, np.tile(noise, (len(z), 1)))
+
     @property
     def num_fitted(self) -> float:
         """`num_used` by all but the nuisances, whose pulls count as data."""
@@ -76,6 +84,12 @@ class GradientFit:
         """How many numbers' worth of the data the parameters were fitted with."""
         count = len(self.steps)
         return float(np.sum(self.free[:count]) - np.trace(self.covariance[:count, :count]))
+
+
+def points_of(fits: Sequence[GradientFit]) -> Batch:
+    """Where fits are."""
+    each = zip(*(fit.points(fit.z[None]) for fit in fits), strict=True)
+    return Batch(*(np.concatenate(leaves) for leaves in each))
 
 
 def laplace_fits(trials: JointProblem, residuals: Residuals, found: Polished) -> list[GradientFit]:

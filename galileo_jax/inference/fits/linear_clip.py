@@ -8,7 +8,7 @@ the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The
 come by Newton steps with the average information, from where all sizes are at their medians and
 from where one is larger and the others are smaller: an error may be brief or last long, and hardly
 any track tells. What x may be is drawn by importance, from the prior, normal distributions round
-these modes, and what fits these draws (`adaptive_mixture.py`).
+these modes, and what fits these draws (`importance_sampling.py`).
 
 Each clip of several is taken with parameters of its own, so that what differs from trial to trial
 is not taken for roughness within one.
@@ -28,9 +28,10 @@ from jaxtyping import Float
 from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.adaptive_mixture import AdaptiveMixture
+from galileo_jax.inference.fits.importance_sampling import WeighedDraws
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
+from galileo_jax.inference.fits.t_proposal import Cloud
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.resampled import resampled
@@ -257,10 +258,11 @@ def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequen
     roots = [WIDER * symmetric_root(inverse(mode.information)) for mode in modes]
     wide = np.eye(len(best.both))  # of the prior; noise scales are known much better than by it
     wide[count:, count:] = 2 * roots[0][count:, count:]
-    prior = _Normal(np.append(np.zeros(count), best.both[count:]), wide)
-    parts = [prior, *(_Normal(mode.both, root) for mode, root in zip(modes, roots, strict=True))]
+    free = np.ones(len(wide), bool)
+    means = [np.append(np.zeros(count), best.both[count:]), *(mode.both for mode in modes)]
+    parts = [Cloud(*own, free, np.inf) for own in zip(means, [wide, *roots], strict=True)]
     shares, generator = np.full(len(parts), 1 / len(parts)), np.random.default_rng(0)
-    made = AdaptiveMixture(parts, shares, np.ones(len(wide), bool))
+    made = WeighedDraws(parts, shares, free)
     while made.ess < ENOUGH_ESS and len(made.z) < MOST_TRIED:
         new = made.draw(generator, NUM_TRIED)
         values = np.array([_value(marginal, terms, each) for each in new])
@@ -270,30 +272,6 @@ def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequen
     evidence = float(np.asarray(logsumexp(made.log_weights))) - np.log(len(made.z)) - at_best
     which = resampled(made.log_weights, NUM_DRAWS, np.random.default_rng(1))
     return Sizes(tuple(term.name for term in terms), best.x, made.z[which], evidence)
-
-
-@dataclass(frozen=True)
-class _Normal:
-    """A normal distribution of log sizes and log noise scales.
-
-    Attributes:
-      mean: `[term and clip]`.
-      root: `[term and clip, term and clip]`, symmetric; its square is the covariance.
-    """
-
-    mean: Float[np.ndarray, " size"]
-    root: Float[np.ndarray, "size size"]
-
-    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
-        """Points `[draw, term and clip]`, and their log density."""
-        points = self.mean + generator.standard_normal((num, len(self.mean))) @ self.root
-        return points, self.log_density(points)
-
-    def log_density(self, z: Float[np.ndarray, "draw size"]) -> Float[np.ndarray, " draw"]:
-        """Of points, `[draw]`."""
-        white = np.linalg.solve(self.root, (z - self.mean).T)
-        log_volume = np.linalg.slogdet(self.root)[1] + 0.5 * len(self.mean) * np.log(2 * np.pi)
-        return -0.5 * np.sum(white**2, axis=0) - log_volume
 
 
 def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> float:

@@ -3,9 +3,7 @@
 Along its least determined directions a posterior may be a crescent. A drag, the power of the speed
 that it grows with, and friction make up for each other over hundreds of the standard deviations of
 what is known best, and not in proportion. No map of a few powers (`transport_map.py`) follows
-that: draws beside the ridge count for nothing, and those that count are all from its middle. Of a
-power that was known to 0.2 they said 0.08, and its evidence came out 1.6 nats too low. But at each
-place along the way all the others are normal about where they are best:
+that. But at each place along the way all the others are normal about where they are best:
 
     q(u) = q(a) t(others | best at a, covariance at a),    a = u along the direction
 
@@ -17,18 +15,17 @@ using integrated nested Laplace approximations, J. R. Stat. Soc. B 71 (2009), 31
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.special import logsumexp
 
+from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
-from galileo_jax.inference.fits.residuals import Batch, Residuals, quadratic
-from galileo_jax.inference.fits.t_proposal import log_student_t, student_t
+from galileo_jax.inference.fits.residuals import Residuals, quadratic
+from galileo_jax.inference.fits.t_proposal import Points, Values, log_student_t, student_t
 from galileo_jax.inference.fits.transport_map import Valley
-from galileo_jax.inference.joint_problem import NOISE_SD
 
 BENT = 3.0  # standard deviations of a stiffer direction, one along a direction: a map follows less
 STEP, MOST_STEPS = 0.5, 10  # standard deviations along the way; to each side
@@ -40,6 +37,9 @@ FAINT_NATS = 10.0  # below the best: there the ridge ends
 CELLS = 256
 FLATTER = 0.8  # power of q(a): what draws must be wider than what is drawn
 
+Look = Callable[[np.ndarray], Quadratic]
+"""The misfit round places u `[place, direction]`, in u."""
+
 
 @dataclass(frozen=True)
 class Ridge:
@@ -47,7 +47,6 @@ class Ridge:
 
     Attributes:
       valley: whose mode and R these are.
-      free: `[parameter]`, those that R leads along.
       direction: the column of R that the way goes along.
       knots: `[knot]`, a, ascending.
       best: of a, the others, `[point, other]`.
@@ -57,7 +56,6 @@ class Ridge:
     """
 
     valley: Valley
-    free: Bool[np.ndarray, " parameter"]
     direction: int
     knots: Float[np.ndarray, " knot"]
     best: Callable[[np.ndarray], np.ndarray]
@@ -65,8 +63,8 @@ class Ridge:
     edges: Float[np.ndarray, " edge"]
     log_share: Float[np.ndarray, " cell"]
 
-    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
-        """Points z, `[draw, parameter]`, and their log density."""
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[Points, Values]:
+        """See `Proposal`."""
         cell = generator.choice(len(self.log_share), num, p=np.exp(self.log_share))
         a = self.edges[cell] + np.diff(self.edges)[cell] * generator.random(num)
         t = student_t(generator, num, len(self.valley.axes)) @ self.valley.axes
@@ -75,9 +73,9 @@ class Ridge:
         z = self.valley.mode + np.insert(others, self.direction, a, axis=1) @ self.valley.root.T
         return z, self.log_density(z)
 
-    def log_density(self, z: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
-        """Of q at points z; -inf beyond the ends of the ridge."""
-        u = self.valley.straight(z, self.free) @ self.valley.axes
+    def log_density(self, z: Points) -> Values:
+        """See `Proposal`; -inf beyond the ends of the ridge."""
+        u = self.valley.along(z)
         a, others = u[:, self.direction], np.delete(u, self.direction, axis=1)
         cell = np.searchsorted(self.edges, a) - 1
         is_inside = (cell >= 0) & (cell < len(self.log_share))
@@ -85,11 +83,9 @@ class Ridge:
         root = self._root_at(a)
         with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
             t = np.einsum("pij,pj->pi", root, others - self.best(a))
-            far = np.nan_to_num(np.sum(t**2, axis=1), nan=np.inf)
-        volume = np.linalg.slogdet(root)[1]
         along = self.log_share[cell] - np.log(np.diff(self.edges)[cell])
-        found = along + log_student_t(far, t.shape[1]) + volume - self.valley.log_volume
-        return np.where(is_inside, found, -np.inf)
+        volume = np.linalg.slogdet(root)[1] - self.valley.log_volume
+        return np.where(is_inside, along + log_student_t(t) + volume, -np.inf)
 
     def _root_at(self, a: np.ndarray) -> np.ndarray:
         """Between knots in proportion, `[point, other, other]`."""
@@ -99,86 +95,56 @@ class Ridge:
         return (1 - share) * self.root[after - 1] + share * self.root[after]
 
 
-class _Places(NamedTuple):
-    """Places on the ridge, and the misfit round them in u; see `Quadratic`."""
-
-    u: Float[np.ndarray, "place direction"]
-    cost: Float[np.ndarray, " place"]
-    gradient: Float[np.ndarray, "place direction"]
-    normal: Float[np.ndarray, "place direction direction"]
-
-
-def bent_direction(valley: Valley) -> int | None:
-    """The direction along which others bend so much that the map does not follow; None: none is."""
-    bends = np.abs(valley.quadratic).max(axis=0)
-    return int(bends.argmax()) if bends.max() > BENT else None
-
-
-def ridge_along(
-    fit: GradientFit, valley: Valley, direction: int, residuals: Residuals
-) -> Ridge | None:
-    """The ridge through a fit; None where it cannot be followed to either side.
+def ridge_along(fit: GradientFit, valley: Valley, residuals: Residuals) -> Ridge | None:
+    """The ridge through a fit; None where the map follows it, or it is lost to either side.
 
     Args:
       fit: the mode.
       valley: round it.
-      direction: which the way goes along.
       residuals: of the trials that were fitted.
     """
+    bends = np.abs(valley.quadratic).max(axis=0)
+    if bends.max() <= BENT:
+        return None
     from scipy.interpolate import CubicSpline  # most fits never come here
 
-    size = valley.root.shape[1] - (len(fit.z) - len(fit.steps))
-    others = np.delete(np.arange(size), direction)
-    look = _looker(fit, valley.root[: len(fit.steps), :size], residuals)
+    direction, count = int(bends.argmax()), len(fit.steps)
+    num_noise = len(fit.z) - count
+    size = valley.root.shape[1] - num_noise
+    root = valley.root[:count, :size]
+
+    def look(u: np.ndarray) -> Quadratic:
+        z = fit.z[:count] + u @ root.T
+        steps = np.tile(fit.steps, (len(z), 1))
+        slopes = residuals.slopes(fit.points(z), steps, is_central=True)
+        found = quadratic(slopes, z)
+        return Quadratic(u, found.cost, found.gradient @ root, root.T @ found.normal @ root)
+
     known = [look(np.zeros((1, size)))]
     for side in (STEP, -STEP):
         known += _one_way(look, known[0], direction, side)
-    places = _Places(*(np.concatenate(values) for values in zip(*known, strict=True)))
-    order = np.argsort(places.u[:, direction])
-    if len(order) < 3:
+    if len(known) < 3:
         return None
-    u, cost, _, normal = (values[order] for values in places)
-    root = symmetric_root(normal[:, others[:, None], others])
-    log_q = -cost - np.linalg.slogdet(root)[1]
-    knots, line = u[:, direction], u[:, others]
-    edges = np.linspace(knots[0], knots[-1], CELLS + 1)
+    known.sort(key=lambda place: place.z[0, direction])
+    u, cost, _, normal = (np.concatenate(values) for values in zip(*known, strict=True))
+    others = np.delete(np.arange(size), direction)
+    precision = symmetric_root(normal[:, others[:, None], others])
+    knots, edges = u[:, direction], np.linspace(u[0, direction], u[-1, direction], CELLS + 1)
+    log_q = -cost - np.linalg.slogdet(precision)[1]
     log_share = FLATTER * np.interp((edges[1:] + edges[:-1]) / 2, knots, log_q)
     # Noise scales, behind the others, hardly depend on these.
-    num_noise = valley.root.shape[1] - size
-    line = np.pad(line, ((0, 0), (0, num_noise)))
     whole = np.tile(np.eye(size - 1 + num_noise), (len(knots), 1, 1))
-    whole[:, : size - 1, : size - 1] = root
-    log_share -= logsumexp(log_share)
-    best = CubicSpline(knots, line)
-    return Ridge(valley, fit.free, direction, knots, best, whole, edges, log_share)
+    whole[:, : size - 1, : size - 1] = precision
+    best = CubicSpline(knots, np.pad(u[:, others], ((0, 0), (0, num_noise))))
+    return Ridge(valley, direction, knots, best, whole, edges, log_share - logsumexp(log_share))
 
 
-def _looker(
-    fit: GradientFit, root: Float[np.ndarray, "parameter direction"], residuals: Residuals
-) -> Callable[[np.ndarray], _Places]:
-    """Of places `[place, direction]` what the misfit is round them."""
-    count = len(fit.steps)
-    noise = np.exp(NOISE_SD * fit.z[count:])
-
-    def look(u: np.ndarray) -> _Places:
-        z = fit.z[:count] + u @ root.T
-        free = np.broadcast_to(fit.free[:count], z.shape)
-        batch = Batch(z, free, np.tile(noise, (len(z), 1)))
-        slopes = residuals.slopes(batch, np.tile(fit.steps, (len(z), 1)), is_central=True)
-        found = quadratic(slopes, z)
-        return _Places(u, found.cost, found.gradient @ root, root.T @ found.normal @ root)
-
-    return look
-
-
-def _one_way(
-    look: Callable[[np.ndarray], _Places], mode: _Places, direction: int, step: float
-) -> list[_Places]:
+def _one_way(look: Look, mode: Quadratic, direction: int, step: float) -> list[Quadratic]:
     """Places from the mode on, by steps along the direction, until the ridge ends or is lost."""
-    before, here, found = mode, mode, list[_Places]()
+    before, here, found = mode, mode, list[Quadratic]()
     least = mode.cost[0]
     for i in range(1, MOST_STEPS + 1):
-        ahead = 2 * here.u - before.u
+        ahead = 2 * here.z - before.z
         ahead[:, direction] = i * step
         there, promised = _descended(look, ahead, direction)
         if not promised < LOST_NATS:
@@ -191,29 +157,26 @@ def _one_way(
     return found
 
 
-def _descended(
-    look: Callable[[np.ndarray], _Places], u: np.ndarray, direction: int
-) -> tuple[_Places, float]:
+def _descended(look: Look, u: np.ndarray, direction: int) -> tuple[Quadratic, float]:
     """Where the others are best, from `u` on, and by how many nats they may still be better."""
     others = np.delete(np.arange(u.shape[1]), direction)
+
+    def step(here: Quadratic) -> tuple[np.ndarray, float]:
+        gradient = here.gradient[0, others]
+        move = -np.linalg.solve(here.normal[0][np.ix_(others, others)], gradient)
+        return move, -0.5 * float(gradient @ move)
+
     best = look(u)
-    move, promised = _step(best, others)
+    move, promised = step(best)
     for _ in range(DESCENDS):
         if promised < SETTLED_NATS:
             break
-        ahead = best.u.copy()
+        ahead = best.z.copy()
         ahead[:, others] += move
         there = look(ahead)
         if there.cost[0] < best.cost[0]:
             best = there
-            move, promised = _step(best, others)
+            move, promised = step(best)
         else:
             move = SHORTER * move
     return best, promised
-
-
-def _step(here: _Places, others: np.ndarray) -> tuple[np.ndarray, float]:
-    """The step of Gauss and Newton from a place, and how many nats it promises."""
-    gradient = here.gradient[0, others]
-    move = -np.linalg.solve(here.normal[0][np.ix_(others, others)], gradient)
-    return move, -0.5 * float(gradient @ move)

@@ -1,14 +1,11 @@
-"""Student's t that fits weighted draws: where a posterior is that no fit describes.
-
-Draws whose weights are too unequal say, all the same, where the posterior is. With its mean and
-covariance by weights that are flattened until enough draws count, a t covers it better than what
-the draws were made from, and so on from there.
+"""Distributions to draw from by importance: elliptical ones, Student's t or normal.
 
 Source: O. Cappé, R. Douc, A. Guillin, J.-M. Marin, C. P. Robert, Adaptive importance sampling in
 general mixture classes, Stat. Comput. 18 (2008), 447 (10.1007/s11222-008-9059-x).
 """
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,34 +13,47 @@ from scipy.special import gammaln
 
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
 
-DEGREES_OF_FREEDOM = 5.0
+FREEDOM = 5.0  # degrees of it, of Student's t
 POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count
 DRAWS_PER_PARAMETER = 4.0
 LEAST_VARIANCE = 1e-10  # in z, of a direction in which draws do not differ
 
+Points = Float[np.ndarray, "draw parameter"]
+Values = Float[np.ndarray, " draw"]
+
+
+@runtime_checkable
+class Proposal(Protocol):
+    """A distribution of which draws and the density are known."""
+
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[Points, Values]:
+        """Points, and their log density."""
+        ...
+
+    def log_density(self, z: Points) -> Values:
+        """Of points, whoever drew them."""
+        ...
+
 
 @dataclass(frozen=True)
 class Cloud:
-    """Student's t of the free parameters.
+    """An elliptical distribution of the free parameters; the others are 0.
 
     Attributes:
       mean: `[free]`, z.
       root: `[free, free]`, symmetric; its square is the covariance of a normal of the same width.
-      free: `[parameter]`, which those are; the others are 0.
+      free: `[parameter]`.
+      freedom: degrees of it, of Student's t; infinite: normal.
     """
 
     mean: Float[np.ndarray, " free"]
     root: Float[np.ndarray, "free free"]
     free: Bool[np.ndarray, " parameter"]
+    freedom: float = FREEDOM
 
     @classmethod
-    def of(
-        cls,
-        z: Float[np.ndarray, "draw parameter"],
-        log_weights: Float[np.ndarray, " draw"],
-        free: Bool[np.ndarray, " parameter"],
-    ) -> "Cloud":
-        """The t round weighted draws."""
+    def of(cls, z: Points, log_weights: Values, free: Bool[np.ndarray, " parameter"]) -> "Cloud":
+        """The t with mean and covariance of draws, their weights flattened till enough count."""
         own = z[:, free]
         for power in POWERS:
             weights = np.exp(power * (log_weights - log_weights.max()))
@@ -54,27 +64,37 @@ class Cloud:
         far = own - mean
         return cls(mean, symmetric_root((weights * far.T) @ far, LEAST_VARIANCE), free)
 
-    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
-        """Points, `[draw, parameter]`, z, and their log density."""
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[Points, Values]:
+        """See `Proposal`."""
         z = np.zeros((num, len(self.free)))
-        z[:, self.free] = self.mean + student_t(generator, num, len(self.mean)) @ self.root
+        u = student_t(generator, num, len(self.mean), self.freedom)
+        z[:, self.free] = self.mean + u @ self.root
         return z, self.log_density(z)
 
-    def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> np.ndarray:
-        """Of the free parameters, `[draw]`."""
-        u = np.linalg.solve(self.root, (z[:, self.free] - self.mean).T)
-        return log_student_t(np.sum(u**2, axis=0), len(u)) - np.linalg.slogdet(self.root)[1]
+    def log_density(self, z: Points) -> Values:
+        """Of the free parameters."""
+        u = np.linalg.solve(self.root, (z[:, self.free] - self.mean).T).T
+        return log_student_t(u, self.freedom) - np.linalg.slogdet(self.root)[1]
 
 
-def log_student_t(far: Float[np.ndarray, " draw"], dim: int) -> Float[np.ndarray, " draw"]:
-    """The log density of a standard t in so many dimensions, at squared distances from its mean."""
-    nu = DEGREES_OF_FREEDOM
-    constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
-    return constant - (nu + dim) / 2 * np.log1p(far / nu)
+def log_student_t(u: Points, freedom: float = FREEDOM) -> Values:
+    """The log density of a standard t, or normal; -inf where `u` is no number."""
+    dim = u.shape[1]
+    with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
+        far = np.nan_to_num(np.sum(u**2, axis=1), nan=np.inf)
+    if np.isinf(freedom):
+        return -0.5 * far - dim / 2 * np.log(2 * np.pi)
+    constant = (
+        gammaln((freedom + dim) / 2) - gammaln(freedom / 2) - dim / 2 * np.log(np.pi * freedom)
+    )
+    return constant - (freedom + dim) / 2 * np.log1p(far / freedom)
 
 
-def student_t(generator: np.random.Generator, num: int, dim: int) -> Float[np.ndarray, "draw dim"]:
+def student_t(
+    generator: np.random.Generator, num: int, dim: int, freedom: float = FREEDOM
+) -> Float[np.ndarray, "draw dim"]:
     """Draws of it. SciPy's `multivariate_t` is the same; its import takes longer than the draws."""
     u = generator.standard_normal((num, dim))
-    chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
-    return u / np.sqrt(chi)[:, None]
+    if np.isinf(freedom):
+        return u
+    return u / np.sqrt(generator.chisquare(freedom, num) / freedom)[:, None]

@@ -28,30 +28,24 @@ Uncertain. Quantif. 6 (2018), 10.1137/17M1134640.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.kernels import FAILED
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.joint_problem import NOISE_SD
-
-if TYPE_CHECKING:  # these need Equinox, and a gradient fit does not
-    from galileo_jax.inference.samplers.sampler import LogDensity
+from galileo_jax.inference.fits.residuals import Residuals
+from galileo_jax.inference.fits.t_proposal import Points, Values, log_student_t, student_t
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
 LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some below 0
-EVERY = slice(None)
-NUM_SCATTERED = 64  # that starts are chosen from
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Valley:
-    """The map from `w`, in which the posterior is about N(0, 1), to `z`.
+    """The map from `w`, in which the posterior is about N(0, 1), to `z`; as a proposal, a t in w.
 
     Attributes:
       mode: `[parameter]`, z at w = 0.
@@ -72,61 +66,37 @@ class Valley:
         u = w @ self.axes
         return self.mode + (u + u**2 @ self.quadratic.T + u**3 @ self.cubic.T) @ self.root.T
 
-    def straight(self, z: np.ndarray, free: np.ndarray | slice = EVERY) -> np.ndarray:
-        """W of z, `[point, direction]`, if there were no bend.
+    def along(self, z: Points) -> np.ndarray:
+        """R^-1 (z - mode), `[point, direction]`: standard deviations along each direction."""
+        own = self.root.any(axis=1)
+        return np.linalg.solve(self.root[own], (z - self.mode)[:, own].T).T
 
-        Args:
-          z: `[point, parameter]`.
-          free: `[parameter]`, those that have directions, if not all.
-        """
-        return self._along_directions(z, free) @ self.axes.T
+    def straight(self, z: Points) -> np.ndarray:
+        """W of z, `[point, direction]`, if there were no bend."""
+        return self.along(z) @ self.axes.T
 
-    def inverse(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """W of z, `[point, direction]`; arguments as of `straight`."""
-        u = self._along_directions(z, free)
+    def inverse(self, z: Points) -> np.ndarray:
+        """W of z, `[point, direction]`."""
+        u = self.along(z)
         for i in range(1, u.shape[1]):
             u[:, i] -= u[:, :i] ** 2 @ self.quadratic[i, :i] + u[:, :i] ** 3 @ self.cubic[i, :i]
         return u @ self.axes.T
-
-    def _along_directions(self, z: np.ndarray, free: np.ndarray | slice) -> np.ndarray:
-        """R^-1 (z - mode), `[point, direction]`: standard deviations along each direction."""
-        return np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
 
     @property
     def log_volume(self) -> float:
         """Log of what a unit of w is in z, which is the same everywhere."""
         return float(np.sum(np.log(np.linalg.svd(self.root, compute_uv=False))))
 
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[Points, Values]:
+        """See `Proposal`."""
+        w = student_t(generator, num, self.root.shape[1])
+        return self(w), log_student_t(w) - self.log_volume
 
-class Coordinates(NamedTuple):
-    """Coordinates w for chains, and what a density looks like in them.
-
-    Attributes:
-      valley: from w to z.
-      mean: `[parameter]`, of w.
-      covariance: `[parameter, parameter]`, of w.
-    """
-
-    valley: Valley
-    mean: np.ndarray
-    covariance: np.ndarray
-
-
-def along(log_density: "LogDensity", valley: Valley) -> "LogDensity":
-    """A log density of z as one of w."""
-    from galileo_jax.inference.samplers.program import Program
-
-    if isinstance(log_density, Program):
-        arrays = (jax.tree.map(jnp.asarray, valley), log_density.arrays)
-        return Program((_program_along, log_density.code), arrays)
-    return lambda w: log_density(valley(w))
-
-
-def _program_along(code: tuple, arrays: tuple[Valley, Any], w: jax.Array) -> jax.Array:
-    from galileo_jax.inference.samplers.program import Program
-
-    valley, rest = arrays
-    return Program(code, rest)(valley(w))
+    def log_density(self, z: Points) -> Values:
+        """See `Proposal`."""
+        with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
+            w = self.inverse(z)
+        return log_student_t(w) - self.log_volume
 
 
 def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
@@ -147,12 +117,12 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     root[own, :size] = axes[:size, :size] * np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
     # Noise scales, behind the others, hardly depend on these.
     root[count:, size:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
-    slopes = residuals.slopes(_near(fit, fit.z[None]), fit.steps[None], is_central=True)
+    slopes = residuals.slopes(fit.points(fit.z[None]), fit.steps[None], is_central=True)
     jacobian = np.concatenate([slopes.among_all(clip, axis=2)[0] for clip in slopes.jacobian])
     step = REACH * np.eye(size)
     z = np.tile(fit.z, (1 + 2 * size, 1))
     z += np.concatenate([np.zeros((1, size)), step, -step]) @ root[:, :size].T
-    white = np.concatenate(residuals.whites(_near(fit, z)), axis=1)
+    white = np.concatenate(residuals.whites(fit.points(z)), axis=1)
     white[np.abs(white).max(axis=1) >= FAILED] = np.nan
     gradient = white @ (jacobian @ root[:count, :size]) + z[:, :count] @ root[:count, :size]
     ahead, behind = gradient[1:].reshape(2, size, size) - gradient[0]
@@ -161,57 +131,9 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     return Valley(fit.z, root, axes, quadratic, cubic)
 
 
-def learned(valley: Valley, w: np.ndarray) -> Coordinates:
-    """Coordinates that suit draws, and the draws' mean and covariance in them.
-
-    The valley's own; or straight ones, if in these a normal density comes closer to the draws: a
-    fit whose widths are wrong, at a kink of the misfit, has wrong bends, too. The determinants are
-    constant, so that those of the covariances compare.
-
-    Args:
-      valley: in whose coordinates the draws were made.
-      w: `[draw, parameter]`.
-    """
-    z = valley(w)
-    bent, straight = np.cov(w, rowvar=False), np.cov(z, rowvar=False)
-    size = np.linalg.slogdet(bent)[1] + 2 * valley.log_volume
-    if size <= np.linalg.slogdet(straight)[1]:
-        return Coordinates(valley, w.mean(axis=0), bent)
-    dim = len(straight)
-    none = np.zeros((dim, dim))
-    axes = np.eye(dim)
-    unbent = Valley(z.mean(axis=0), np.linalg.cholesky(straight), axes, none, none)
-    return Coordinates(unbent, np.zeros(dim), axes)
-
-
-def scattered(
-    valley: Valley, fit: GradientFit, residuals: Residuals, seed: int, num: int
-) -> np.ndarray:
-    """Starts for chains, `[chain, parameter]`, in w; wider than the posterior, as R-hat asks.
-
-    Drawn from the density to the power 1/2, by importance from N(0, 2): where the map leads
-    astray, far off, none is left.
-    """
-    size = int(np.sum(fit.free[: len(fit.steps)]))
-    generator = np.random.default_rng([seed, 10])
-    w = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), valley.root.shape[1]))
-    points = _near(fit, valley(w))
-    surplus = 0.25 * np.sum(w[:, :size] ** 2, axis=1) - 0.5 * residuals.costs(points)
-    # The largest of log-weights with Gumbel noise: a draw without replacement.
-    return w[np.argsort(-(surplus + generator.gumbel(size=len(w))))[:num]]
-
-
 def _stiffer(moved: np.ndarray) -> np.ndarray:
     """`[direction that bends, direction bent]` transposed, of those that bend stiffer ones.
 
     None is led where a rollout fails.
     """
     return np.tril(np.where(np.isfinite(moved.T), moved.T, 0.0), -1)
-
-
-def _near(fit: GradientFit, z: np.ndarray) -> Batch:
-    """Points with the fit's noise."""
-    count = len(fit.steps)
-    noise = np.exp(NOISE_SD * fit.z[count:])
-    free = np.broadcast_to(fit.free[:count], (len(z), count))
-    return Batch(z[:, :count], free, np.tile(noise, (len(z), 1)))
