@@ -23,14 +23,12 @@ from galileo_jax.inference.fits.residuals import (
     cost,
     quadratic,
 )
-from galileo_jax.runtime.batching import MOTIONS, in_chunks, one_at_a_time
+from galileo_jax.runtime.batching import in_chunks, one_at_a_time
 
 # Of a parameter's coarse step. The rigid engine rounds below its own; MuJoCo's contacts are rough
 # below theirs; above the largest a step may leave a plateau (nothing moves) over its edge, and the
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
-# Proposals: their rollouts, and those of their slopes, are best made in one batch, if each has few.
-FEW = 4
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
@@ -194,10 +192,6 @@ class Descent:
           widths: `[point, model parameter]`, of all points; those of `active` are changed.
           active: `[proposal]`, which points they are of.
         """
-        if len(there.z) <= FEW and there.free.sum(axis=1).max() < MOTIONS[0]:
-            slopes = self.slopes(there, widths[active])
-            widths[active] = self.half_sd(slopes)
-            return quadratic(slopes, there.z)
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)
         better = np.flatnonzero(total < own.cost)

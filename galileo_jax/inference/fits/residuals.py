@@ -84,21 +84,19 @@ class Residuals:
 
     def whites(self, points: Batch) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip."""
-        return [
-            self._whites(clip, points.z, points.free, points.noise[:, c])
-            for c, clip in enumerate(self.clips)
-        ]
+        return [self._whites(c, points) for c in range(len(self.clips))]
 
     def motions(self, points: Batch) -> Motions:
         """By rollouts, clip by clip."""
-        return [self._simulate(clip, points.z, points.free) for clip in self.clips]
+        self.num_rollouts += len(self.clips) * len(points.z)
+        thetas = [clip.theta(points.z, points.free) for clip in self.clips]
+        each = zip(self.clips, thetas, strict=True)
+        return [(theta, *clip.problem.motion(theta)) for clip, theta in each]
 
     def whites_of(self, points: Batch, motions: Motions) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip, of points that were rolled out."""
-        return [
-            _white(clip, motion, points.noise[:, c])
-            for c, (clip, motion) in enumerate(zip(self.clips, motions, strict=True))
-        ]
+        each = zip(self.clips, motions, points.noise.T, strict=True)
+        return [in_chunks(MOTIONS, _white(clip), *motion, noise) for clip, motion, noise in each]
 
     def slopes(
         self,
@@ -115,56 +113,26 @@ class Residuals:
           is_central: differences to both sides, not forward ones.
           motions: of the points, where they are known.
         """
-        index = _free_index(points.free)
+        index, sides = _free_index(points.free), (1, -1) if is_central else (1,)
         jacobians, whites = [], []
-        for c, clip in enumerate(self.clips):
-            moves = self._moves(clip, index, steps, is_central)
-            aside, motion = self._aside(c, points, moves, None if motions is None else motions[c])
+        for c, motion in enumerate(motions or self.motions(points)):
             white, jacobian = self._seen_slopes(c, points, index, motion)
-            change = (aside - white[moves.point]) / moves.step[:, None]
-            mean = change.reshape(moves.sides, -1, change.shape[1]).mean(axis=0)
-            jacobian[moves.point[: len(mean)], :, moves.slot[: len(mean)]] = mean
+            moves = np.append(self._is_simulated, False)
+            moves &= np.isin(np.arange(self._count + 1), self.clips[c].column)
+            point, slot = np.nonzero(moves[index])
+            which = index[point, slot]
+            step, rows = steps[point, which], np.arange(len(point))
+            mean = np.zeros((len(point), white.shape[1]))
+            aside = [points.take(point) for _ in sides]
+            for batch, side in zip(aside, sides, strict=True):
+                batch.z[rows, which] += side * step
+            moved = self._whites(c, Batch(*map(np.concatenate, zip(*aside, strict=True))))
+            for own, side in zip(np.split(moved, len(sides)), sides, strict=True):
+                mean += (own - white[point]) / (side * step[:, None]) / len(sides)
+            jacobian[point, :, slot] = mean
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
-
-    def _moves(
-        self, clip: FittedClip, index: np.ndarray, steps: np.ndarray, is_central: bool
-    ) -> "_Moves":
-        """Rollouts for differences; `index` as of `Slopes`, other arguments as of `slopes`."""
-        padded = np.pad(self._is_simulated, (0, 1))
-        own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
-        point, slot = np.nonzero(padded[index] & own[index])
-        which = index[point, slot]
-        step = steps[point, which]
-        sides = 2 if is_central else 1
-        signed = np.concatenate([step, -step][:sides])
-        point, slot, which = (np.tile(values, sides) for values in (point, slot, which))
-        return _Moves(point, slot, which, signed, sides)
-
-    def _aside(
-        self, c: int, points: Batch, moves: "_Moves", motion: tuple[np.ndarray, ...] | None
-    ) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-        """A clip's residuals at the rollouts of `moves`, and the points' own motions.
-
-        These are `motion`, or, where that is None, all are rolled out in one batch.
-        """
-        clip, noise = self.clips[c], points.noise[moves.point, c]
-        moved = points.z[moves.point]
-        moved[np.arange(len(moved)), moves.which] += moves.step
-        free = points.free[moves.point]
-        if motion is not None:
-            return self._whites(clip, moved, free, noise), motion
-        first = len(points.z)
-        theta = clip.theta(np.concatenate([points.z, moved]), np.concatenate([points.free, free]))
-        self.num_rollouts += len(theta)
-        whiten = _white_batch_of(clip)
-        white, *made = clip.problem.of_motions(
-            theta,
-            lambda theta, *rest: (whiten(theta, *rest), *rest[:2]),
-            np.concatenate([points.noise[:, c], noise]),
-        )
-        return white[first:], (theta[:first], *(values[:first] for values in made))
 
     def _seen_slopes(
         self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]
@@ -183,47 +151,17 @@ class Residuals:
         jacobian[point, :, slot] = slopes[point, :, column]
         return white, jacobian
 
-    def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray):
-        """`[point, ...]`: parameters in their units, centres and velocities."""
-        self.num_rollouts += len(z)
-        theta = clip.theta(z, free)
-        return theta, *clip.problem.motion(theta)
-
-    def _whites(
-        self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray
-    ) -> Float[np.ndarray, "point value"]:
+    def _whites(self, c: int, points: Batch) -> Float[np.ndarray, "point value"]:
         """Whitened residuals of a clip, of points that were not rolled out."""
-        if not len(z):
+        clip = self.clips[c]
+        if not len(points.z):
             return np.zeros((0, clip.data.whitening.observed_m.size))
-        self.num_rollouts += len(z)
-        return clip.problem.of_motions(clip.theta(z, free), _white_batch_of(clip), noise)
+        self.num_rollouts += len(points.z)
+        theta = clip.theta(points.z, points.free)
+        return clip.problem.of_motions(theta, _white(clip), points.noise[:, c])
 
 
-class _Moves(NamedTuple):
-    """What slopes are differences of; of both sides first all of one, then all of the other.
-
-    Attributes:
-      point, slot, which: `[rollout]`, whose point, which of its free parameters, and which that is
-        among the models'.
-      step: `[rollout]`, in z.
-      sides: 1 or 2.
-    """
-
-    point: np.ndarray
-    slot: np.ndarray
-    which: np.ndarray
-    step: np.ndarray
-    sides: int
-
-
-def _white(
-    clip: FittedClip, motion: Sequence[np.ndarray], noise: np.ndarray
-) -> Float[np.ndarray, "point value"]:
-    """Whitened residuals of a clip's motions."""
-    return in_chunks(MOTIONS, _white_batch_of(clip), *motion, noise)
-
-
-def _white_batch_of(clip: FittedClip) -> Callable[..., Any]:
+def _white(clip: FittedClip) -> Callable[..., Any]:
     """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
     data, scene, *_ = clip.arrays
     return lambda *part: white_batch(clip.kind, *part, data, scene)
