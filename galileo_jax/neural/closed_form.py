@@ -48,7 +48,6 @@ class Line(NamedTuple):
     at_s: jax.Array
     curve_sd: jax.Array
     slope_sd: jax.Array
-    count: jax.Array
 
     def __call__(self, time_s: jax.Array) -> jax.Array:
         """The parabola at a time."""
@@ -69,167 +68,103 @@ class Decay(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What is known before anything is fitted.
+    """What is known before anything is fitted."""
 
-    Attributes:
-      frame: `[frame]`, 0, 1, ...
-      dt_s: between two frames.
-      sin, cos: of the ramp's angle.
-      imperfect: 0 in an ideal world, 1 for bodies that are no points.
-      filmed: 1 where a camera stands between, 0 where none does.
-      along_m: `[frame]`, object 1's place along the ramp.
-      corner_m: `[object]`, x at which the centre turns from the ramp's direction to the table's.
-      margin_m: either side of it, where object 1 stands on two edges.
-      moved_m: `[object]`, so far no noise carries.
-    """
-
-    frame: jax.Array
-    dt_s: jax.Array
-    sin: jax.Array
+    frame: jax.Array  # [frame], 0, 1, ...
+    dt_s: jax.Array  # between two frames
+    sin: jax.Array  # of the ramp's angle
     cos: jax.Array
-    imperfect: jax.Array
-    filmed: jax.Array
-    along_m: jax.Array
-    corner_m: jax.Array
-    margin_m: jax.Array
-    moved_m: jax.Array
+    along_m: jax.Array  # [frame], object 1's place along the ramp
+    corner_m: (
+        jax.Array
+    )  # [object], x where its centre turns from the ramp's direction to the table's
+    margin_m: jax.Array  # either side of it, where object 1 stands on two edges
+    moved_m: jax.Array  # [object], so far no noise carries
 
 
 class Onset(NamedTuple):
-    """When object 2 begins to move.
+    """When object 2 begins to move."""
 
-    Attributes:
-      place2_m: where it stands before.
-      gone2: `[frame]`, where it has left.
-      frame: the first of them; the number of frames where there is none.
-      is_hit: whether it is sure that it moves.
-      hit_frame: as `frame`, but the number of frames where it is not sure.
-      before: `[frame]`, surely before it.
-    """
-
-    place2_m: jax.Array
-    gone2: jax.Array
-    frame: jax.Array
-    is_hit: jax.Array
-    hit_frame: jax.Array
-    before: jax.Array
+    place2_m: jax.Array  # where it stands before
+    gone2: jax.Array  # [frame], where it has left
+    frame: jax.Array  # the first of them; the number of frames where there is none
+    is_hit: jax.Array  # whether it is sure that it moves
+    hit_frame: jax.Array  # as `frame`, but the number of frames where it is not sure
+    before: jax.Array  # [frame], surely before it
 
 
 class Ramp(NamedTuple):
-    """Object 1 on the ramp.
+    """Object 1 on the ramp."""
 
-    Attributes:
-      start_m: its first place along the ramp; gone_m: `[frame]`, the way from there.
-      moves: whether it surely slides.
-      is_there: `[frame]`, on the ramp; is_going: those in which it is surely on its way.
-      path: through the latter; at_once: likewise, from `start_m`.
-      friction: of `path`.
-      friction_at_once: as if let go exactly in the first frame; better where that is so.
-      release_s: when it was let go.
-    """
-
-    start_m: jax.Array
-    gone_m: jax.Array
-    moves: jax.Array
-    is_there: jax.Array
-    is_going: jax.Array
-    path: Line
-    at_once: Line
-    friction: Estimate
-    friction_at_once: jax.Array
-    release_s: jax.Array
+    start_m: jax.Array  # its first place along the ramp
+    gone_m: jax.Array  # [frame], the way from there
+    moves: jax.Array  # whether it surely slides
+    is_there: jax.Array  # [frame], on the ramp
+    is_going: jax.Array  # [frame], and surely on its way
+    path: Line  # through these
+    at_once: Line  # likewise, from `start_m`
+    friction: Estimate  # of `path`
+    friction_at_once: jax.Array  # as if let go exactly in the first frame; better where that is so
+    release_s: jax.Array  # when it was let go
 
 
 class Table(NamedTuple):
-    """Object 1 on the table, between foot and hit.
+    """Object 1 on the table, between foot and hit."""
 
-    Attributes:
-      is_there: `[frame]`, on the table; is_sliding: those in which it is not at rest.
-      path: through the latter.
-      friction: of `path`.
-      end1_m, rest1: where object 1 is in the end, and in how many frames.
-    """
+    is_there: jax.Array  # [frame], on the table
+    is_sliding: jax.Array  # [frame], and not at rest
+    path: Line  # through these
+    friction: Estimate  # of `path`
 
-    is_there: jax.Array
-    is_sliding: jax.Array
-    path: Line
-    friction: Estimate
-    end1_m: jax.Array
-    rest1: jax.Array
+
+class Slide(NamedTuple):
+    """An object after the hit: a decay where it comes to rest, a parabola where it does not."""
+
+    is_there: jax.Array  # [frame], measured after the hit
+    is_sliding: jax.Array  # [frame], and not at rest
+    end_m: jax.Array  # where it is in the end
+    rest: jax.Array  # in how many frames
+    root: Decay
+    free: Line
+    rests: jax.Array  # whether it comes to rest
 
 
 class After(NamedTuple):
-    """Both objects after the hit.
+    """Both objects after the hit."""
 
-    Attributes:
-      is_there: `[object, frame]`, measured after it.
-      slides1, slides2: `[frame]`, where they are not at rest.
-      end2_m, rest2: where object 2 is in the end, and in how many frames.
-      root1, root2: the motions that come to rest; free1, free2: parabolas where they do not.
-      rests1, rests2: whether each comes to rest.
-      decay2: object 2's deceleration, m/s^2.
-      way2_m: how far object 2 goes.
-    """
-
-    is_there: jax.Array
-    slides1: jax.Array
-    slides2: jax.Array
-    end2_m: jax.Array
-    rest2: jax.Array
-    root1: Decay
-    root2: Decay
-    free1: Line
-    free2: Line
-    rests1: jax.Array
-    rests2: jax.Array
-    decay2: Estimate
-    way2_m: jax.Array
+    one: Slide
+    two: Slide
+    decay2: Estimate  # object 2's deceleration, m/s^2
+    way2_m: jax.Array  # how far object 2 goes
 
 
 class Hit(NamedTuple):
-    """The hit: its time, and the speeds before and after it, m/s.
-
-    Attributes:
-      time_s: of the hit; latest_s: when object 2 has surely left.
-      reach_m: x of object 1 where the objects touch.
-      from_table, from_ramp: object 1's speed before, by its places on the table, and by its speed
-        at the foot; before1: both together.
-      own1: object 1's speed after, by its own motion.
-      after1: likewise, and by that both leave a nearly plastic hit together.
-      after2: object 2's.
-    """
+    """The hit: its time, and the speeds before and after it, m/s."""
 
     time_s: jax.Array
-    latest_s: jax.Array
-    reach_m: jax.Array
-    from_table: Estimate
-    from_ramp: Estimate
-    before1: Estimate
-    own1: Estimate
-    after1: Estimate
-    after2: Estimate
+    latest_s: jax.Array  # when object 2 has surely left
+    reach_m: jax.Array  # x of object 1 where the objects touch
+    from_table: Estimate  # object 1's speed before, by its places on the table
+    from_ramp: Estimate  # by its speed at the foot
+    before1: Estimate  # by both
+    own1: Estimate  # object 1's speed after, by its own motion
+    after1: Estimate  # and by that both leave a nearly plastic hit together
+    after2: Estimate  # object 2's
 
 
 class Phases(NamedTuple):
-    """All of them, and what they say.
-
-    Attributes:
-      friction1: object 1's, from ramp and table.
-      ratio: of the masses, m1 / m2; its error is relative.
-      pushes: object 1 goes on pushing object 2.
-      friction2: object 2's.
-    """
+    """All of them, and what they say."""
 
     setting: Setting
     onset: Onset
     ramp: Ramp
     table: Table
-    friction1: Estimate
+    friction1: Estimate  # object 1's, from ramp and table
     after: After
     hit: Hit
-    ratio: Estimate
-    pushes: jax.Array
-    friction2: Estimate
+    ratio: Estimate  # of the masses, m1 / m2; its error is relative
+    pushes: jax.Array  # object 1 goes on pushing object 2
+    friction2: Estimate  # object 2's
 
 
 def fit_phases(seen: Seen) -> Phases:
@@ -239,9 +174,9 @@ def fit_phases(seen: Seen) -> Phases:
     ramp = _ramp(seen, setting, onset)
     table = _table(seen, setting, onset)
     friction1 = _friction1(seen, ramp, table)
-    after = _after(seen, setting, onset, table)
+    after = _after(seen, setting, onset)
     hit = _hit(seen, setting, onset, ramp, table, friction1, after)
-    ratio = _mass_ratio(setting, hit)
+    ratio = _mass_ratio(seen, hit)
     # What brakes harder in front of object 1 is pushed by it.
     pushes = after.decay2.value > seen.gravity * friction1.value
     friction2 = _friction2(seen, friction1, after, ratio, pushes)
@@ -261,20 +196,26 @@ def parabola(t: jax.Array, y: jax.Array, mask: jax.Array, noise: jax.Array) -> L
     base = (weight * y).sum() / jnp.maximum(count, 1)
     c = covariance @ (design @ (weight * (y - base)))
     sd = noise * jnp.sqrt(jnp.diagonal(covariance))
-    return Line(c[0] + base, c[1] / span, c[2] / span**2, at, sd[2] / span**2, sd[1] / span, count)
+    return Line(c[0] + base, c[1] / span, c[2] / span**2, at, sd[2] / span**2, sd[1] / span)
 
 
 def decay(t: jax.Array, left: jax.Array, mask: jax.Array, noise: jax.Array) -> Decay:
     """Fits `sqrt(2 left) = sqrt(rate) (stop - t)`, weighted for equal errors of `left`."""
     root = jnp.sqrt(2 * jnp.maximum(left, 1e-9))
-    weight = jnp.where(mask, root**2, 0.0)
-    total = jnp.maximum(weight.sum(), 1e-12)
-    at, mean = (weight * t).sum() / total, (weight * root).sum() / total
-    spread = (weight * (t - at) ** 2).sum()
-    slope = (weight * (t - at) * (root - mean)).sum() / jnp.maximum(spread, 1e-12)
+    at, mean, slope, per_noise = _straight(t, root, jnp.where(mask, root**2, 0.0), 1e-12)
     slope = jnp.minimum(slope, -1e-3)
-    slope_sd = noise / jnp.sqrt(jnp.maximum(spread, 1e-12))
-    return Decay(slope**2, at - mean / slope, 2 * jnp.abs(slope) * slope_sd)
+    return Decay(slope**2, at - mean / slope, 2 * jnp.abs(slope) * noise * per_noise)
+
+
+def _straight(
+    t: jax.Array, y: jax.Array, weight: jax.Array, least: float
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """The weighted straight line: its middle (t, y), its slope, and the slope's sd per noise."""
+    total = jnp.maximum(weight.sum(), least)
+    at, mean = (weight * t).sum() / total, (weight * y).sum() / total
+    spread = jnp.maximum((weight * (t - at) ** 2).sum(), least)
+    slope = (weight * (t - at) * (y - mean)).sum() / spread
+    return at, mean, slope, 1 / jnp.sqrt(spread)
 
 
 def _combine(one: Estimate, other: Estimate) -> Estimate:
@@ -308,8 +249,6 @@ def _setting(seen: Seen) -> Setting:
         dt_s=seen.times_s[1] - seen.times_s[0],
         sin=sin,
         cos=cos,
-        imperfect=1.0 - seen.is_ideal,
-        filmed=seen.is_filmed,
         along_m=x1 * cos - y1 * sin,
         corner_m=seen.half_height_m * jnp.tan(seen.angle_rad / 2),
         margin_m=AT_FOOT * seen.half_length_m[0],
@@ -354,7 +293,7 @@ def _ramp(seen: Seen, setting: Setting, onset: Onset) -> Ramp:
         at_once=parabola(t, along - start, going, noise),
         friction=Estimate(
             (sin - path.curve / g) / cos,
-            jnp.hypot(path.curve_sd, setting.filmed * CAMERA_SD_M_S2) / (g * cos),
+            jnp.hypot(path.curve_sd, seen.is_filmed * CAMERA_SD_M_S2) / (g * cos),
         ),
         friction_at_once=(sin - from_rest / g) / cos,
         release_s=jnp.clip(release, -0.5, 1.0),
@@ -367,9 +306,9 @@ def _table(seen: Seen, setting: Setting, onset: Onset) -> Table:
     end, rest = _at_end(x, mask, noise)
     sliding = is_there & (onset.is_hit | (end - x > setting.moved_m[0]) | (rest < 3))
     path = parabola(seen.times_s, x, sliding, noise)
-    sd = jnp.hypot(path.curve_sd, setting.filmed * 2 * CAMERA_SD_M_S2) / seen.gravity
+    sd = jnp.hypot(path.curve_sd, seen.is_filmed * 2 * CAMERA_SD_M_S2) / seen.gravity
     friction = Estimate(-path.curve / seen.gravity, sd)
-    return Table(is_there, sliding, path, friction, end, rest)
+    return Table(is_there, sliding, path, friction)
 
 
 def _friction1(seen: Seen, ramp: Ramp, table: Table) -> Estimate:
@@ -385,38 +324,33 @@ def _friction1(seen: Seen, ramp: Ramp, table: Table) -> Estimate:
     return Estimate(jnp.clip(value, 1e-4, 0.99), sd)
 
 
-def _after(seen: Seen, setting: Setting, onset: Onset, table: Table) -> After:
-    t, mask, noise = seen.times_s, seen.mask, seen.noise_m
-    x1, x2 = seen.position_m[:, 0]
-    is_there = mask & (setting.frame >= onset.frame)
-    end2, rest2 = _at_end(x2, mask[1], noise[1])
-    left2, left1 = end2 - x2, table.end1_m - x1
-    slides2 = is_there[1] & (left2 > setting.moved_m[1]) & onset.gone2
-    slides1 = is_there[0] & (left1 > setting.moved_m[0])
-    root2 = decay(t, left2, slides2, noise[1])
-    free2 = parabola(t, x2, slides2 | (is_there[1] & (rest2 < 3)), noise[1])
-    root1 = decay(t, left1, slides1, noise[0])
-    free1 = parabola(t, x1, slides1 | (is_there[0] & (table.rest1 < 3)), noise[0])
-    rests2 = (rest2 >= 3) & (slides2.sum() >= 2)
-    rate = jnp.where(rests2, root2.rate, -free2.curve)
-    rate_sd = jnp.where(rests2, root2.rate_sd, free2.curve_sd)
+def _after(seen: Seen, setting: Setting, onset: Onset) -> After:
+    two = _slide(seen, setting, onset, 1, onset.gone2)
+    rate = jnp.where(two.rests, two.root.rate, -two.free.curve)
+    sd = jnp.where(two.rests, two.root.rate_sd, two.free.curve_sd)
+    sd = jnp.hypot(sd, seen.is_filmed * 2 * CAMERA_SD_M_S2)
     return After(
+        one=_slide(seen, setting, onset, 0, seen.mask[0]),
+        two=two,
+        decay2=Estimate(jnp.clip(rate, 1e-3, seen.gravity), sd),
+        way2_m=jnp.maximum(two.end_m - onset.place2_m, 1e-5),
+    )
+
+
+def _slide(seen: Seen, setting: Setting, onset: Onset, i: int, gone: jax.Array) -> Slide:
+    """Object i's; `gone`: `[frame]`, where it may slide."""
+    t, x, noise = seen.times_s, seen.position_m[i, 0], seen.noise_m[i]
+    is_there = seen.mask[i] & (setting.frame >= onset.frame)
+    end, rest = _at_end(x, seen.mask[i], noise)
+    slides = is_there & (end - x > setting.moved_m[i]) & gone
+    return Slide(
         is_there=is_there,
-        slides1=slides1,
-        slides2=slides2,
-        end2_m=end2,
-        rest2=rest2,
-        root1=root1,
-        root2=root2,
-        free1=free1,
-        free2=free2,
-        rests1=(table.rest1 >= 3) & (slides1.sum() >= 2),
-        rests2=rests2,
-        decay2=Estimate(
-            jnp.clip(rate, 1e-3, seen.gravity),
-            jnp.hypot(rate_sd, setting.filmed * 2 * CAMERA_SD_M_S2),
-        ),
-        way2_m=jnp.maximum(end2 - onset.place2_m, 1e-5),
+        is_sliding=slides,
+        end_m=end,
+        rest=rest,
+        root=decay(t, end - x, slides, noise),
+        free=parabola(t, x, slides | (is_there & (rest < 3)), noise),
+        rests=(rest >= 3) & (slides.sum() >= 2),
     )
 
 
@@ -437,7 +371,7 @@ def _hit(
     own1 = _own_speed_after(setting, time, after)
     after2 = _speed2_after(seen, time, after)
     # A hit is nearly plastic, so that both leave it at almost one speed.
-    rebound, rebound_sd = setting.imperfect * REBOUND, setting.imperfect * REBOUND_SD
+    rebound, rebound_sd = (1.0 - seen.is_ideal) * REBOUND, (1.0 - seen.is_ideal) * REBOUND_SD
     as_one = Estimate(
         after2.value - rebound * before1.value, rebound_sd * before1.value + after2.sd
     )
@@ -450,31 +384,33 @@ def _hit_time(
 ) -> tuple[jax.Array, jax.Array]:
     """Where object 2's parabola leaves its place; and when it has surely left."""
     t, last = seen.times_s, len(seen.times_s) - 1
-    by_distance = after.root2.stop_s - jnp.sqrt(2 * after.way2_m / after.decay2.value)
-    slope = after.free2.speed(t[jnp.minimum(onset.frame, last)])
+    by_distance = after.two.root.stop_s - jnp.sqrt(2 * after.way2_m / after.decay2.value)
+    slope = after.two.free.speed(t[jnp.minimum(onset.frame, last)])
     stood = jnp.where(seen.mask[1] & (setting.frame < onset.frame), t, 0.0).max()
     earliest = stood - setting.dt_s
     latest = t[jnp.clip(onset.frame, 0, last)]
-    at_gone = latest - (after.free2(latest) - onset.place2_m) / jnp.maximum(slope, 1e-2)
-    return jnp.clip(jnp.where(after.rests2, by_distance, at_gone), earliest, latest), latest
+    at_gone = latest - (after.two.free(latest) - onset.place2_m) / jnp.maximum(slope, 1e-2)
+    return jnp.clip(jnp.where(after.two.rests, by_distance, at_gone), earliest, latest), latest
 
 
 def _own_speed_after(setting: Setting, time: jax.Array, after: After) -> Estimate:
     """Object 1's speed after the hit by its own motion."""
-    root, free = after.root1, after.free1
-    speed = jnp.where(after.rests1, root.rate * (root.stop_s - time), free.speed(time))
+    root, free = after.one.root, after.one.free
+    speed = jnp.where(after.one.rests, root.rate * (root.stop_s - time), free.speed(time))
     sd = jnp.where(
-        after.rests1,
+        after.one.rests,
         speed * root.rate_sd / root.rate,
         free.slope_sd + setting.dt_s * free.curve_sd,
     )
-    return Estimate(speed, jnp.where(after.slides1.sum() >= 2, jnp.clip(sd, 1e-4, NEVER), NEVER))
+    return Estimate(
+        speed, jnp.where(after.one.is_sliding.sum() >= 2, jnp.clip(sd, 1e-4, NEVER), NEVER)
+    )
 
 
 def _speed2_after(seen: Seen, time: jax.Array, after: After) -> Estimate:
     """Object 2's speed after the hit."""
     rate, way = after.decay2, after.way2_m
-    speed = jnp.where(after.rests2, jnp.sqrt(2 * rate.value * way), after.free2.speed(time))
+    speed = jnp.where(after.two.rests, jnp.sqrt(2 * rate.value * way), after.two.free.speed(time))
     speed = jnp.clip(speed, 1e-3, None)
     return Estimate(speed, speed * jnp.hypot(0.5 * rate.sd / rate.value, seen.noise_m[1] / way))
 
@@ -490,7 +426,7 @@ def _speed_from_ramp(
     turned = jnp.maximum(setting.cos - k1 * setting.sin, 0.0)
     square = jnp.maximum(at_foot_speed * turned, 0.0) ** 2
     speed = jnp.sqrt(jnp.maximum(square - 2 * k1 * g * (reach - corner), 1e-6))
-    of_foot = setting.imperfect * FOOT_SD * speed
+    of_foot = (1.0 - seen.is_ideal) * FOOT_SD * speed
     return Estimate(speed, of_foot + friction1.sd * g * reach / speed + 5 * seen.noise_m[0])
 
 
@@ -498,24 +434,19 @@ def _speed_on_table(seen: Seen, time: jax.Array, table: Table, friction1: Estima
     """Object 1's speed at the hit, from a straight line: better than the parabola's, k1 known."""
     t, g, sliding = seen.times_s, seen.gravity, table.is_sliding
     lift = friction1.value * g * (t - time) ** 2 / 2
-    flat = jnp.where(sliding, seen.position_m[0, 0] + lift, 0.0)
-    weight = sliding.astype(t.dtype)
-    count = jnp.maximum(weight.sum(), 1.0)
-    mean_t, mean_x = (weight * t).sum() / count, flat.sum() / count
-    spread = (weight * (t - mean_t) ** 2).sum()
-    speed = (weight * (t - mean_t) * (flat - mean_x)).sum() / jnp.maximum(spread, 1e-9)
-    sd = seen.noise_m[0] / jnp.sqrt(jnp.maximum(spread, 1e-9))
-    sd = sd + friction1.sd * g * jnp.abs(mean_t - time)
+    flat = seen.position_m[0, 0] + lift
+    at, _, speed, per_noise = _straight(t, flat, sliding.astype(t.dtype), 1e-9)
+    sd = seen.noise_m[0] * per_noise + friction1.sd * g * jnp.abs(at - time)
     return Estimate(speed, jnp.where(sliding.sum() >= 2, sd, NEVER))
 
 
-def _mass_ratio(setting: Setting, hit: Hit) -> Estimate:
+def _mass_ratio(seen: Seen, hit: Hit) -> Estimate:
     """Momentum: what object 1 loses object 2 gets."""
     v1, v2 = hit.before1, hit.after2
     lost = jnp.maximum(v1.value - hit.after1.value, 0.003 * jnp.abs(v1.value) + 1e-3)
     ratio = jnp.clip(v2.value / lost, 3e-3, 300.0)
     sd = jnp.hypot(v2.sd / v2.value, jnp.hypot(v1.sd, hit.after1.sd) / lost)
-    return Estimate(ratio, jnp.hypot(sd, CAMERA_RATIO_SD * setting.filmed) + 1e-4)
+    return Estimate(ratio, jnp.hypot(sd, CAMERA_RATIO_SD * seen.is_filmed) + 1e-4)
 
 
 def _friction2(

@@ -80,7 +80,7 @@ def _estimates(phases: Phases) -> tuple[jax.Array, jax.Array]:
     density = jnp.exp(-0.5 * centre**2) / jnp.sqrt(2 * jnp.pi)
     scale = [friction1.sd / density[0], phases.ratio.sd / log_ratio_sd, friction2.sd / density[2]]
     scale = jnp.stack(scale)
-    enough = after.slides2.sum() >= jnp.where(after.rests2, 2, LEAST_FRAMES)
+    enough = after.two.is_sliding.sum() >= jnp.where(after.two.rests, 2, LEAST_FRAMES)
     slid = phases.onset.is_hit & enough
     known = jnp.stack([phases.ramp.moves, slid, slid])
     centre = jnp.where(known, centre, 0.0)
@@ -126,7 +126,7 @@ def _features_always(
         *(_sized((ramp.friction.value - k1) / k1_sd), _sized((table.friction.value - k1) / k1_sd)),
         *(_sized((ramp.friction_at_once - k1) / k1_sd), _sized(ramp.at_once.slope)),
         *(1 / scale[0]) ** 0.5 * jnp.ones(1) / 10,
-        *(phases.after.rests1, seen.is_filmed, seen.is_tracked_here),
+        *(phases.after.one.rests, seen.is_filmed, seen.is_tracked_here),
     ]
 
 
@@ -140,7 +140,7 @@ def _features_of_hit(
     last = len(seen.times_s) - 1
     since = hit.time_s - hit.latest_s
     decay_sd = after.decay2.sd + 1e-3
-    between = after.end2_m - table.end1_m - phases.onset.place2_m + hit.reach_m
+    between = after.two.end_m - after.one.end_m - phases.onset.place2_m + hit.reach_m
     return [
         *(centre[1], centre[2], _log(scale[1]), _log(scale[2])),
         *(hit.reach_m, since, since / phases.setting.dt_s, _log(after.way2_m)),
@@ -150,12 +150,12 @@ def _features_of_hit(
             _log(hit.own1.value + 1e-3),
             phases.pushes,
         ),
-        *(_log(after.slides1.sum() + 1.0), _log(after.slides2.sum() + 1.0)),
-        *(after.rests2, table.rest1 > 30, _log(after.rest2 + 1.0)),
-        *(_log(after.decay2.value), _log(jnp.clip(after.root1.rate, 1e-3, 20))),
+        *(_log(after.one.is_sliding.sum() + 1.0), _log(after.two.is_sliding.sum() + 1.0)),
+        *(after.two.rests, after.one.rest > 30, _log(after.two.rest + 1.0)),
+        *(_log(after.decay2.value), _log(jnp.clip(after.one.root.rate, 1e-3, 20))),
         _sized((after.decay2.value / g - k1) * 10),
-        _sized((-after.free2.curve - after.decay2.value) / decay_sd),
-        _sized((after.root1.rate - k1 * g) / decay_sd),
+        _sized((-after.two.free.curve - after.decay2.value) / decay_sd),
+        _sized((after.one.root.rate - k1 * g) / decay_sd),
         *(
             _sized(between * 30),
             _sized((hit.own1.value - hit.after2.value) / (hit.after2.sd + 1e-3)),
@@ -165,9 +165,9 @@ def _features_of_hit(
         *(_log(hit.from_table.sd), _log(hit.from_ramp.sd)),
         *(_log(hit.before1.sd), _log(hit.after2.sd)),
         _sized((table.path(hit.time_s) - hit.reach_m) * 100),
-        *(_log(after.free2.curve_sd), _sized(phases.ratio.value)),
-        _sized((after.root1.stop_s - after.root2.stop_s) * 10),
-        *(_sized(after.free1.slope), _sized(after.free2.slope)),
+        *(_log(after.two.free.curve_sd), _sized(phases.ratio.value)),
+        _sized((after.one.root.stop_s - after.two.root.stop_s) * 10),
+        *(_sized(after.one.free.slope), _sized(after.two.free.slope)),
         _sized((x1[jnp.minimum(phases.onset.hit_frame, last)] - hit.reach_m) * 100),
     ]
 
@@ -197,10 +197,10 @@ def _residuals(seen: Seen, phases: Phases) -> jax.Array:
 
     on_ramp = phases.setting.along_m - ramp.path(t)
     first = jnp.where(ramp.is_there, on_ramp, jnp.where(table.is_there, x1 - table.path(t), 0.0))
-    after1 = x1 - stopping(table.end1_m, after.root1.rate, after.root1.stop_s)
-    first = jnp.where(after.is_there[0] & onset.is_hit, after1, first)
-    after2 = x2 - stopping(after.end2_m, after.decay2.value, after.root2.stop_s)
-    second = jnp.where(after.is_there[1], after2, 0.0)
+    after1 = x1 - stopping(after.one.end_m, after.one.root.rate, after.one.root.stop_s)
+    first = jnp.where(after.one.is_there & onset.is_hit, after1, first)
+    after2 = x2 - stopping(after.two.end_m, after.decay2.value, after.two.root.stop_s)
+    second = jnp.where(after.two.is_there, after2, 0.0)
     second = jnp.where(seen.mask[1] & onset.before, x2 - onset.place2_m, second)
     return jnp.stack([first, second])
 
