@@ -154,9 +154,9 @@ def _check(options: FitOptions) -> None:
     check_known("--engine", "engine", options.engine, ENGINES)
     _refuse_ignored(options)
     if options.method == "mh":
-        from galileo_jax.inference.samplers import sampler_names
+        from galileo_jax.inference.samplers.sampler import SAMPLERS
 
-        check_known("--sampler", "sampler", options.sampler, sampler_names())
+        check_known("--sampler", "sampler", options.sampler, SAMPLERS.names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
             f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, {BLOCK_STEPS} "

@@ -17,8 +17,8 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.log_posterior import density_of
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
-from galileo_jax.inference.samplers import sample, sampler_class
-from galileo_jax.inference.samplers.driver import Progress, Settings
+from galileo_jax.inference.samplers.driver import Progress, Settings, sample
+from galileo_jax.inference.samplers.sampler import SAMPLERS
 
 # R-hat < 1.01 needs about 50 effective draws for each half chain, so that fewer chains would be
 # cheaper; but four learn too poor a proposal (measured: acceptance 0.14 against 0.41).
@@ -87,10 +87,10 @@ def metropolis_posterior(
                 steps = before + state.num_steps
                 on_block(replace(state, num_steps=steps, max_steps=total))
 
-        kernel = sampler_class(sampler)
+        kernel = SAMPLERS.get(sampler)
         return sample(
             jax.random.fold_in(key, 1) if is_second else key,
-            kernel.from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),  # pyright: ignore
+            kernel.from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
             density_of(trials, fit, valley),
             jnp.asarray(begin),
             trials.names,

@@ -12,13 +12,13 @@ import numpy as np
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
 from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.inference.samplers.sampler import (
     AbstractSampler,
     Info,
     LogDensity,
     State,
+    metropolis_hastings,
     turn_of_one,
 )
 from galileo_jax.runtime.errors import InputError

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.inference.fits.distinct_modes import apart
-from galileo_jax.inference.fits.laplace import Code, GradientFit
+from galileo_jax.inference.fits.gradient import Code, GradientFit, apart
 
 FIT = GradientFit(
     z=np.zeros(3), free=np.array([True, True, False]), covariance=np.diag([0.01, 1.0, 0.0]),

@@ -13,7 +13,7 @@ from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.transport_map import Valley, valley_round
 from galileo_jax.inference.log_posterior import density_of
 from galileo_jax.inference.metropolis import learned, metropolis_posterior, scattered
-from galileo_jax.inference.samplers import Settings
+from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.search.fit import best_fit
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit

@@ -189,7 +189,8 @@ from galileo_jax.runtime.jax_setup import set_up
 set_up()
 import jax
 import jax.numpy as jnp
-from galileo_jax.inference.samplers import Settings, sample, sampler_class
+from galileo_jax.inference.samplers.driver import Settings, sample
+from galileo_jax.inference.samplers.sampler import SAMPLERS
 from galileo_jax.rollout.engine_c_free import EngineCFree
 from galileo_jax.rollout.rollout import in_jax
 from tests.rollout.objects import theta_of
@@ -202,7 +203,7 @@ def log_density(z):
     return -0.5 * jnp.sum(z**2) - 0.5 * jnp.sum((position[0, :, 0, -1] - 0.3) ** 2)
 
 dim = len(theta)
-sampler = sampler_class("mixture").from_gaussian(jnp.zeros(dim), jnp.eye(dim))
+sampler = SAMPLERS.get("mixture").from_gaussian(jnp.zeros(dim), jnp.eye(dim))
 steps = Settings(warmup_steps=0, block_steps=5, max_steps=5, stops_early=False)
 names = [f"z{i}" for i in range(dim)]
 sample(jax.random.key(0), sampler, log_density, jnp.zeros((4, dim)), names, settings=steps)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from galileo_jax.inference.samplers import sampler_names
+from galileo_jax.inference.samplers.sampler import SAMPLERS
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.registry import Registry, entry_names
 from galileo_jax.thesis.similarity import similarity_names
@@ -14,7 +14,7 @@ from galileo_jax.thesis.similarity import similarity_names
 def test_entries_are_named_as_their_files():
     assert entry_names("galileo_jax.thesis.similarities") == similarity_names()
     told = entry_names("galileo_jax.inference.samplers.library")
-    assert told == sampler_names() == ("mixture", "random_walk")
+    assert told == SAMPLERS.names() == ("mixture", "random_walk")
 
 
 def test_fit_lists_them_without_jax():

@@ -149,7 +149,7 @@ def test_a_fit_that_is_beside_the_posterior_goes_on(is_smooth, monkeypatch):
     best = best_fit(fitter, 0)
     beside = best.z + 4 * np.sqrt(np.diag(best.covariance)) * (np.arange(len(best.z)) == 1)
     stuck = replace(best, z=beside, log_evidence=best.log_evidence - 8.0)
-    monkeypatch.setattr(fitter, "_descent", replace(fitter._descent, is_smooth=is_smooth))
+    monkeypatch.setattr(fitter, "is_smooth", is_smooth)
     table = Table.of(fitter, Stakes(), 0, Hypothesis((), stuck))
     _, found = looked_round(table)
     if is_smooth:

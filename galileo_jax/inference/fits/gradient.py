@@ -21,8 +21,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from galileo_jax.inference.fits.descent import BEHIND_IN_SEARCH, Descended, Descent, GiveUp
-from galileo_jax.inference.fits.distinct_modes import apart
+from galileo_jax.inference.fits.descent import (
+    BEHIND_IN_SEARCH,
+    SAME_VALLEY_NATS,
+    Descended,
+    Descent,
+    GiveUp,
+)
 from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
 from galileo_jax.inference.fits.laplace import laplace_fits, points_of
@@ -51,32 +56,32 @@ MOST_STEPS, MOST_RACE_STEPS, MOST_POLISH_STEPS = 80, 20, 80
 SETTLED_NATS, SETTLED_IF_ROUGH_NATS, SETTLED_IN_TURN_NATS = 0.05, 0.5, 0.3
 STILL = 1e-5  # standard deviations, and of a noise scale: a fit that moves on by less stands still
 STILL_NATS = STILL**2
+MOST_ADDED, ADDS_NATS = 3, 3.0  # valleys whose evidence adds up, unless so far behind the best
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 # What a fit that has come to rest says of itself, well or ill.
 SETTLED = (Code.CONVERGED, Code.MISFIT)
 
 
 class GradientFitter:
-    """Descends on the residuals of trials, for any hypotheses."""
+    """Descends on the residuals of trials, for any hypotheses.
 
-    def __init__(self, trials: JointProblem, settled_nats: float = SETTLED_NATS):
-        """`settled_nats`: by less a last round lowers chi2 / 2, where motion is smooth."""
-        self.trials = trials
-        is_smooth = trials.problems[0].engine.name == "rigid"
-        self._descent = Descent(Residuals(trials), trials.coarse_steps, is_smooth, not is_smooth)
-        self._residuals = self._descent.residuals
+    In arguments `z` is `[point, model parameter]`, `free` likewise (`JointProblem.free`), and `owner`
+    `[point]`: which hypothesis each point belongs to, from 0.
+
+    Attributes:
+      trials: what is fitted.
+      residuals: of the trials.
+      is_smooth: whether motion is smooth at every scale, as the rigid engine's is.
+    """
+
+    def __init__(self, trials: JointProblem):
+        self.trials, self.residuals = trials, Residuals(trials)
+        self.is_smooth = trials.problems[0].engine.name == "rigid"
         self._count = len(trials.model_parameters)
-        self._settled = settled_nats if is_smooth else SETTLED_IF_ROUGH_NATS
 
-    @property
-    def residuals(self) -> Residuals:
-        """Of the trials."""
-        return self._residuals
-
-    @property
-    def is_smooth(self) -> bool:
-        """Whether motion is smooth at every scale, as the rigid engine's is."""
-        return self._descent.is_smooth
+    def _descent(self, is_central: bool = False) -> Descent:
+        is_central |= not self.is_smooth
+        return Descent(self.residuals, self.trials.coarse_steps, self.is_smooth, is_central)
 
     def compile(self, with_races: bool = False) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes.
@@ -85,19 +90,86 @@ class GradientFitter:
           with_races: what many hypotheses at once need, too.
         """
         one, many = (np.zeros((n, self._count)) for n in (1, MANY))
-        parts: list[Callable[[], Any]] = []
+        descent, parts = self._descent(), list[Callable[[], Any]]()
         if with_races:
             free = self.trials.free(self.trials.all_effects)[: self._count]
-            parts.append(functools.partial(self._descent, self._batch(many, free), np.inf, 1))
+            parts.append(functools.partial(descent, self._batch(many, free), np.inf, 1))
         for effects in dict.fromkeys([(), self.trials.all_effects]):
             free = self.trials.free(effects)[: self._count]
-            parts.append(functools.partial(self._descent, self._batch(one, free), np.inf, 1))
-            parts.append(functools.partial(self._residuals.costs, self._batch(many, free)))
+            parts.append(functools.partial(descent, self._batch(one, free), np.inf, 1))
+            parts.append(functools.partial(self.search_costs, many, free))
         if self.is_smooth:
             side_by_side(parts)
         else:  # MuJoCo's engines keep one set of simulations for all batches of a size
             for part in parts:
                 part()
+
+    def fit_from(
+        self,
+        z: Float[np.ndarray, "point parameter"],
+        free: Bool[np.ndarray, "point parameter"],
+        owner: Int[np.ndarray, " point"],
+    ) -> list[GradientFit]:
+        """Fits of several hypotheses at once, each from one or more starts: of its best one."""
+        points, give_up = self._batch(z, free), GiveUp(owner, BEHIND_IN_SEARCH)
+        found = self._descent()(points, ENOUGH_NATS, MOST_STEPS, give_up)
+        first = np.lexsort([found.best.cost, owner])
+        best = first[np.unique(owner[first], return_index=True)[1]]
+        ends = points._replace(z=found.best.z).take(best)
+        return list(self._polish(ends, np.arange(len(best)))[0].values())
+
+    def race(
+        self,
+        z: Float[np.ndarray, "point parameter"],
+        free: Bool[np.ndarray, "point parameter"],
+        owner: Int[np.ndarray, " point"],
+        lowest: float = np.inf,
+    ) -> Descended:
+        """Searches for several hypotheses at once, as long as each may still win.
+
+        A start stops where it joins a better one of its hypothesis, or is far behind: of its
+        hypothesis, or of the best of all, `lowest` (nats) among these. Costs are those at the
+        search's noise, which is no less than the clip's: who is far behind by them is farther
+        behind by the clip's own.
+        """
+        give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
+        return self._descent()(self._batch(z, free), ENOUGH_NATS, MOST_RACE_STEPS, give_up)
+
+    def polish(
+        self,
+        z: Float[np.ndarray, "point parameter"],
+        free: Bool[np.ndarray, "point parameter"],
+        owner: Int[np.ndarray, " point"],
+    ) -> dict[int, GradientFit]:
+        """Fits from where a search ended, one for each valley, by the row of where it came from."""
+        return self._polish(self._batch(z, free), owner)[0]
+
+    def polish_in_turn(
+        self,
+        z: Float[np.ndarray, "point parameter"],
+        free: Bool[np.ndarray, "point parameter"],
+        parts: Sequence[np.ndarray],
+    ) -> Iterator[tuple[int, GradientFit]]:
+        """Fits of hypotheses, one point of each, roughly; `parts`: indices, one after the other.
+
+        Those far behind what an earlier part came to are left where they are.
+        """
+        lowest = np.inf
+        for own in parts:
+            points, owner = self._batch(z[own], free[own]), np.arange(len(own))
+            fits, lowest = self._polish(points, owner, lowest, SETTLED_IN_TURN_NATS)
+            for row, fit in fits.items():
+                yield int(own[row]), fit
+
+    def search_costs(self, z: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " point"]:
+        """chi2 / 2 and the prior's part at the search's noise: to choose starts."""
+        return self.residuals.costs(self._batch(z, free))
+
+    def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
+        """Whether `noise_explains` what it leaves."""
+        data = [clip.data.whitening for clip in self.residuals.clips]
+        degrees = sum(float(GaussianLikelihood.degrees(1.0, own)) for own in data)
+        return noise_explains(fit.chi2, degrees - fit.num_used, noise_scale)
 
     def continued(self, fit: GradientFit, to_rest: bool = True) -> GradientFit:
         """A fit of other sizes of imperfections, gone on from, with the valleys beside it.
@@ -113,112 +185,6 @@ class GradientFitter:
             return replace(found, code=Code.MISFIT)
         return found
 
-    def fit_from(
-        self,
-        starts: Float[np.ndarray, "start parameter"],
-        free: Bool[np.ndarray, "start parameter"],
-        owner: Int[np.ndarray, " start"],
-    ) -> list[GradientFit]:
-        """Fits several hypotheses at once, each from one or more starts.
-
-        Args:
-          starts: `[start, model parameter]`, z.
-          free: `[start, model parameter]`, see `JointProblem.free`.
-          owner: `[start]`, which hypothesis each belongs to, ascending from 0.
-
-        Returns:
-          One fit per hypothesis, of its best start.
-        """
-        points = self._batch(starts, free)
-        give_up = GiveUp(owner, BEHIND_IN_SEARCH)
-        found = self._descent(points, ENOUGH_NATS, MOST_STEPS, give_up)
-        best = []
-        for hypothesis in range(int(owner.max()) + 1):
-            own = np.flatnonzero(owner == hypothesis)
-            best.append(own[np.argmin(found.best.cost[own])])
-        ends = points._replace(z=found.best.z).take(np.array(best))
-        return list(self._polish(ends, np.arange(len(best)))[0].values())
-
-    def race(
-        self,
-        starts: Float[np.ndarray, "start parameter"],
-        free: Bool[np.ndarray, "start parameter"],
-        owner: Int[np.ndarray, " start"],
-        lowest: float = np.inf,
-    ) -> Descended:
-        """Searches for several hypotheses at once, as long as each may still win.
-
-        A start stops where it joins a better one of its hypothesis, or is far behind: of its
-        hypothesis, or of the best of all. Costs are those at the search's noise, which is no less
-        than the clip's: who is far behind by them is farther behind by the clip's own.
-
-        Args:
-          starts: `[start, model parameter]`, z.
-          free: `[start, model parameter]`, see `JointProblem.free`.
-          owner: `[start]`, which hypothesis each belongs to.
-          lowest: cost that others have already come to, nats.
-        """
-        give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
-        return self._descent(self._batch(starts, free), ENOUGH_NATS, MOST_RACE_STEPS, give_up)
-
-    def polish(
-        self,
-        z: Float[np.ndarray, "point parameter"],
-        free: Bool[np.ndarray, "point parameter"],
-        owner: Int[np.ndarray, " point"],
-    ) -> dict[int, GradientFit]:
-        """Fits from where a search ended, one fit for each valley of each hypothesis.
-
-        Args:
-          z: `[point, model parameter]`.
-          free: `[point, model parameter]`.
-          owner: `[point]`, which hypothesis each belongs to.
-
-        Returns:
-          By the index of the point from which it came.
-        """
-        return self._polish(self._batch(z, free), owner)[0]
-
-    def polish_in_turn(
-        self,
-        z: Float[np.ndarray, "hypothesis parameter"],
-        free: Bool[np.ndarray, "hypothesis parameter"],
-        parts: Sequence[np.ndarray],
-    ) -> Iterator[tuple[int, GradientFit]]:
-        """Fits one end of each of several hypotheses, part by part of them, roughly.
-
-        Those far behind what an earlier part came to are left where they are.
-
-        Args:
-          z: `[hypothesis, model parameter]`.
-          free: `[hypothesis, model parameter]`.
-          parts: indices of hypotheses.
-        """
-        lowest, settled = np.inf, max(self._settled, SETTLED_IN_TURN_NATS)
-        for own in parts:
-            points = self._batch(z[own], free[own])
-            fits, lowest = self._polish(points, np.arange(len(own)), lowest, settled)
-            for row, fit in fits.items():
-                yield int(own[row]), fit
-
-    def costs_beside(
-        self, fit: GradientFit, z: Float[np.ndarray, "point parameter"]
-    ) -> Float[np.ndarray, " point"]:
-        """chi2 / 2 and the prior's part of other points, with a fit's own noise and parameters."""
-        return self._residuals.costs(fit.points(z))
-
-    def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
-        return self._residuals.costs(self._batch(z, free))
-
-    def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
-        """Whether `noise_explains` what it leaves."""
-        degrees = sum(
-            float(GaussianLikelihood.degrees(1.0, clip.data.whitening))
-            for clip in self._residuals.clips
-        )
-        return noise_explains(fit.chi2, degrees - fit.num_used, noise_scale)
-
     def at_rest(self, found: Sequence[GradientFit]) -> GradientFit:
         """The most evident fit and those of other valleys that count beside it, standing still.
 
@@ -228,34 +194,31 @@ class GradientFitter:
         fit = _with_beside(found)
         if not self.is_smooth or fit.code is not Code.CONVERGED:
             return fit
-        points = points_of((fit, *fit.beside))
-        descent, owner = replace(self._descent, is_central=True), np.arange(len(points.z))
+        points, descent = points_of((fit, *fit.beside)), self._descent(is_central=True)
+        owner = np.arange(len(points.z))
         modes = polish(descent, points, owner, STILL_NATS, MOST_POLISH_STEPS, drift=STILL)
-        still = laplace_fits(self.trials, self._residuals, modes)
+        still = laplace_fits(self.trials, self.residuals, modes)
         return _with_beside([replace(one, code=Code.CONVERGED) for one in still])
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)
-        noise = np.tile(
-            [clip.search_noise(SEARCH_SD_M) for clip in self._residuals.clips],
-            (len(z), 1),
-        )
-        return Batch(np.where(free, z, 0.0), free, noise)
+        noise = [clip.search_noise(SEARCH_SD_M) for clip in self.residuals.clips]
+        return Batch(np.where(free, z, 0.0), free, np.tile(noise, (len(z), 1)))
 
     def _polish(
         self,
         points: Batch,
         owner: np.ndarray,
         lowest: float = np.inf,
-        settled: float | None = None,
+        settled: float = SETTLED_NATS,
     ) -> tuple[dict[int, GradientFit], float]:
         """Fits by the row of the point from which each came, and the least cost.
 
         Who joined another has none; `lowest`: the least cost of others.
         """
-        settled = settled or self._settled
-        found = polish(self._descent, points, owner, settled, MOST_POLISH_STEPS, lowest)
-        fits = laplace_fits(self.trials, self._residuals, found)
+        settled = settled if self.is_smooth else SETTLED_IF_ROUGH_NATS
+        found = polish(self._descent(), points, owner, settled, MOST_POLISH_STEPS, lowest)
+        fits = laplace_fits(self.trials, self.residuals, found)
         return dict(zip(found.rows.tolist(), fits, strict=True)), found.lowest
 
 
@@ -265,3 +228,18 @@ def _with_beside(fits: Sequence[GradientFit]) -> GradientFit:
     sound = [fit for fit in fits if fit.code is Code.CONVERGED and fit is not best]
     _, *others = apart([best, *sound])
     return replace(best, beside=tuple(others))
+
+
+def apart(fits: Sequence[GradientFit]) -> list[GradientFit]:
+    """The best fit, and those of other valleys that add to its evidence, best first."""
+    left, found = sorted(fits, key=lambda fit: -fit.log_evidence), list[GradientFit]()
+    least = left[0].log_evidence - ADDS_NATS
+    while left and len(found) < MOST_ADDED:
+        first, *left = left
+        found.append(first)
+        inverse = np.linalg.pinv(first.covariance, hermitian=True)
+        steps = [fit.z - first.z for fit in left]
+        is_far = [0.5 * step @ inverse @ step >= SAME_VALLEY_NATS for step in steps]
+        each = zip(left, is_far, strict=True)
+        left = [fit for fit, far in each if far and fit.log_evidence > least]
+    return found

@@ -24,7 +24,6 @@ class Polished(NamedTuple):
       points: with fitted noise scales.
       widths: `[point, model parameter]`, steps of differences at the posterior's scale, in z.
       is_settled: `[point]`.
-      num_steps: how many it took.
       lowest: the least cost with what noise scales cost, nats.
       rows: `[point]`, which of the points given: those that came to the valley of a better one of
         their owner are left out.
@@ -33,7 +32,6 @@ class Polished(NamedTuple):
     points: Batch
     widths: Float[np.ndarray, "point parameter"]
     is_settled: Bool[np.ndarray, " point"]
-    num_steps: int
     lowest: float
     rows: Int[np.ndarray, " point"]
 
@@ -65,7 +63,7 @@ def polish(
     count, size = z.shape
     normal, widths = np.tile(np.eye(size), (count, 1, 1)), np.tile(descent.coarse_steps, (count, 1))
     is_settled, total = np.zeros(count, bool), np.full(count, np.inf)
-    active, num_steps, is_alone = np.arange(count), 0, np.ones(count, bool)
+    active, is_alone = np.arange(count), np.ones(count, bool)
     num_values = np.array([clip.data.whitening.num_values for clip in descent.residuals.clips])
     for _ in range(MAX_ROUNDS):
         here = Batch(z, points.free, noise).take(active)
@@ -77,7 +75,6 @@ def polish(
         give_up = GiveUp(owner[active], BEHIND, price[active], BEHIND, lowest)
         found = descent(here._replace(noise=scales), SHARE_PROMISED * settled, max_steps, give_up)
         z[active], normal[active], widths[active] = found.best.z, found.best.normal, found.widths
-        num_steps += found.num_steps
         total[active] = found.best.cost + price[active]
         gains = found.first_cost - found.best.cost
         is_settled[active] = (gains < settled) & ~drifts & found.is_settled
@@ -90,7 +87,7 @@ def polish(
             break
     rows = np.flatnonzero(is_alone)
     ends = Batch(z, points.free, noise).take(rows)
-    return Polished(ends, widths[rows], is_settled[rows], num_steps, lowest, rows)
+    return Polished(ends, widths[rows], is_settled[rows], lowest, rows)
 
 
 def noise_scales(

@@ -31,8 +31,8 @@ from galileo_jax.inference.samplers.checkpoint import History
 from galileo_jax.inference.samplers.program import compiled
 from galileo_jax.inference.samplers.sampler import (
     AbstractSampler,
-    AbstractTunedSampler,
     LogDensity,
+    TunedSampler,
 )
 
 GAIN_EXPONENT = 0.6
@@ -52,7 +52,6 @@ class Settings:
       block_steps: per chain, between two looks at convergence, two checkpoints and two
         reports, whole turns of the sampler; a Ctrl-C takes effect at the end of a block.
       max_steps: per chain, after the warm-up, where convergence does not come before.
-      thin: every `thin`-th draw is kept.
       max_rhat: stop when R-hat of every monitored quantity is below.
       min_ess: and its bulk effective sample size is at least this.
       stops_early: False runs `max_steps`, whatever the diagnostics say.
@@ -61,13 +60,12 @@ class Settings:
     warmup_steps: int = 200
     block_steps: int = 25
     max_steps: int = 4000
-    thin: int = 1
     max_rhat: float = 1.01
     min_ess: float = 400.0
     stops_early: bool = True
 
     def __post_init__(self) -> None:
-        for name in ("block_steps", "max_steps", "thin"):
+        for name in ("block_steps", "max_steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
         for name in ("warmup_steps", "max_steps"):
@@ -96,19 +94,6 @@ class Progress:
     convergence: Mapping[str, Convergence]
 
 
-def dispersed_starts(
-    key: jax.Array, mean: jax.Array, covariance: jax.Array, num_chains: int
-) -> jax.Array:
-    """Starting positions `[chain, dim]` ~ N(mean, 2 covariance).
-
-    Wider than the posterior, so that R-hat can see chains that have not yet met.
-    """
-    mean = jnp.asarray(mean)
-    cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, mean.dtype))
-    noise = jax.random.normal(key, (num_chains, *mean.shape), mean.dtype)
-    return mean + jnp.sqrt(2.0).astype(mean.dtype) * noise @ cholesky.T
-
-
 def sample(
     key: jax.Array,
     sampler: AbstractSampler,
@@ -126,7 +111,7 @@ def sample(
 
     Arguments:
       key: the only source of randomness; the same key gives the same draws.
-      sampler: tuned in the warm-up where it is an `AbstractTunedSampler`.
+      sampler: tuned in the warm-up where it is an `TunedSampler`.
       log_density: `[dim] -> []`, vmapped over the chains (one call per turn for all).
       start: `[chain, dim]`; see `dispersed_starts`.
       names: of the `dim` coordinates.
@@ -148,23 +133,25 @@ def sample(
     monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
     identity = _fingerprint(key, sampler, start, names, settings, identity)
     states, sampler, history = _begun(sampler, log_density, start, checkpoint, identity)
-    total = settings.warmup_steps + settings.max_steps
-    state = _diagnose(history, settings, monitor) if _is_due(history, settings) else {}
+    warmup, total = settings.warmup_steps, settings.warmup_steps + settings.max_steps
+    state = dict[str, Convergence]()
+    if _is_due(history, settings):
+        state = convergences(monitor(history.position[:, warmup:]))
     while history.num_steps < total and not _is_enough(state, settings):
         with _interrupt_deferred():
-            done, is_warmup = history.num_steps, history.num_steps < settings.warmup_steps
+            done, is_warmup = history.num_steps, history.num_steps < warmup
             turns = jnp.arange(done, done + settings.block_steps, sampler.steps_per_turn)
-            gains = _gains(len(turns)) * (1.0 if is_warmup else 0.0)
+            gains = is_warmup * (jnp.arange(len(turns)) + 1.0) ** -GAIN_EXPONENT
             arrays = (log_density, sampler, jax.random.key_data(key), states, turns, gains)
             states, sampler, record = compiled(_run_block, (states, sampler, (0, 0, 0)), *arrays)
             block = History(*(np.asarray(leaf) for leaf in record))
             history = history.extended(block)
-            if is_warmup and isinstance(sampler, AbstractTunedSampler):
+            if is_warmup and isinstance(sampler, TunedSampler):
                 sampler = _refitted(sampler, history)
             if checkpoint is not None:
                 checkpoints.save(Path(checkpoint), identity, (states, sampler), history)
         if _is_due(history, settings):
-            state = _diagnose(history, settings, monitor)
+            state = convergences(monitor(history.position[:, warmup:]))
         if on_block is not None:
             accepted = float(block.is_accepted.mean())
             on_block(Progress(history.num_steps, total, is_warmup, accepted, state))
@@ -219,23 +206,21 @@ def _begun(
       ValueError: the log density is not finite at a start.
       InputError: the checkpoint belongs to another run, or is damaged.
     """
+    shapes = eqx.filter_eval_shape(_states_at, jnp.sum, sampler, start)  # without an evaluation
     if checkpoint is not None and Path(checkpoint).exists():
-        # What the file must look like follows from shapes alone, without an evaluation.
-        shapes = _states_like(sampler, start)
         (states, sampler), history = checkpoints.load(checkpoint, identity, (shapes, sampler))
         return states, sampler, history
-    states = _initial_states(sampler, log_density, start)
-    _check_finite(np.asarray(states.log_density))
-    return states, sampler, _empty_history(states)
-
-
-def _initial_states(sampler: AbstractSampler, log_density: LogDensity, start: jax.Array) -> Any:
-    return compiled(_states_at, _states_like(sampler, start), log_density, sampler, start)
-
-
-def _states_like(sampler: AbstractSampler, start: jax.Array) -> Any:
-    """Shapes of the chains' states, without an evaluation."""
-    return eqx.filter_eval_shape(_states_at, jnp.sum, sampler, start)
+    states = compiled(_states_at, shapes, log_density, sampler, start)
+    found = np.asarray(states.log_density)
+    bad = np.flatnonzero(~np.isfinite(found))
+    if bad.size:
+        raise ValueError(
+            f"the log density is {found[bad[0]]} at the start of chain {bad[0]} "
+            f"({bad.size} of {found.size} chains); start where it is finite"
+        )
+    none = np.zeros((len(found), 0), found.dtype)
+    position = np.zeros((len(found), 0, start.shape[1]), start.dtype)
+    return states, sampler, History(position, none, none.astype(bool))
 
 
 def _states_at(log_density: LogDensity, sampler: AbstractSampler, start: jax.Array) -> Any:
@@ -263,7 +248,7 @@ def _run_block(
         # Keys follow from the step's number, so that a resumed run needs no stored key.
         keys = jax.random.split(jax.random.fold_in(key, first_step), num_chains)
         states, (trace, info) = jax.vmap(lambda k, s: sampler.turn(k, s, log_density))(keys, states)
-        if isinstance(sampler, AbstractTunedSampler):
+        if isinstance(sampler, TunedSampler):
             sampler = sampler.rescaled(info, gain)
         return (states, sampler), (trace.position, trace.log_density, info.is_accepted)
 
@@ -277,29 +262,7 @@ def _of_chains(leaf: jax.Array) -> jax.Array:
     return leaf.reshape(leaf.shape[0], -1, *leaf.shape[3:])
 
 
-def _gains(num_steps: int) -> jax.Array:
-    return (jnp.arange(num_steps) + 1.0) ** -GAIN_EXPONENT
-
-
-def _check_finite(log_density: np.ndarray) -> None:
-    bad = np.flatnonzero(~np.isfinite(log_density))
-    if bad.size:
-        raise ValueError(
-            f"the log density is {log_density[bad[0]]} at the start of chain {bad[0]} "
-            f"({bad.size} of {log_density.size} chains); start where it is finite"
-        )
-
-
-def _empty_history(states: Any) -> History:
-    num_chains, dim = states.position.shape
-    return History(
-        position=np.zeros((num_chains, 0, dim), states.position.dtype),
-        log_density=np.zeros((num_chains, 0), states.log_density.dtype),
-        is_accepted=np.zeros((num_chains, 0), bool),
-    )
-
-
-def _refitted(sampler: AbstractTunedSampler, history: History) -> AbstractTunedSampler:
+def _refitted(sampler: TunedSampler, history: History) -> TunedSampler:
     """Mean and covariance of the newer half, shrunk towards the sampler's own covariance.
 
     The window counts with its effective draws, the covariance before it with five per
@@ -317,11 +280,6 @@ def _refitted(sampler: AbstractTunedSampler, history: History) -> AbstractTunedS
     return sampler.fitted(jnp.asarray(flat.mean(axis=0)), jnp.asarray(covariance))
 
 
-def _thinned(history: History, settings: Settings) -> History:
-    first = settings.warmup_steps + settings.thin - 1
-    return History(*(leaf[:, first :: settings.thin] for leaf in history))
-
-
 def _is_due(history: History, settings: Settings) -> bool:
     """Diagnostics cost as much as tens of steps: look when a tenth has come on top."""
     blocks = (history.num_steps - settings.warmup_steps) // settings.block_steps
@@ -329,14 +287,6 @@ def _is_due(history: History, settings: Settings) -> bool:
     while look < blocks:
         look = max(look + 1, look + look // 10)
     return settings.stops_early and look == blocks
-
-
-def _diagnose(
-    history: History,
-    settings: Settings,
-    monitor: Callable[[np.ndarray], Mapping[str, np.ndarray]],
-) -> dict[str, Convergence]:
-    return convergences(monitor(_thinned(history, settings).position))
 
 
 def _is_enough(state: Mapping[str, Convergence], settings: Settings) -> bool:
@@ -354,27 +304,26 @@ def _posterior(
     settings: Settings,
     state: Mapping[str, Convergence],
 ) -> Posterior:
-    thinned = _thinned(history, settings)
-    sampled = history.is_accepted[:, settings.warmup_steps :]
+    sampled = History(*(leaf[:, settings.warmup_steps :] for leaf in history))
     if not settings.stops_early:
         status = Status.FIXED_LENGTH
     elif _is_enough(state, settings):
         status = Status.CONVERGED
-    elif not sampled.any(axis=1).all():
+    elif not sampled.is_accepted.any(axis=1).all():
         status = Status.STUCK_CHAIN
     else:
         status = Status.STEP_LIMIT
     num_chains = history.position.shape[0]
     return Posterior(
         names=tuple(names),
-        draws=thinned.position,
-        log_density=thinned.log_density,
+        draws=sampled.position,
+        log_density=sampled.log_density,
         status=status,
         stats={
             "num_chains": num_chains,
             "num_steps": history.num_steps,
             "num_evaluations": num_chains * (1 + history.num_steps),
-            "acceptance_rate": float(sampled.mean()),
+            "acceptance_rate": float(sampled.is_accepted.mean()),
         },
         provenance={
             "sampler": sampler.name,

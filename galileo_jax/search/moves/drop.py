@@ -56,7 +56,8 @@ def along_nuisances(fitter: GradientFitter, fit: GradientFit) -> np.ndarray:
     own = positive_nuisances(fitter.trials, fit.free)
     points = np.tile(z, (len(own), len(ALONG_Z), 1))
     points[np.arange(len(own)), :, own] = ALONG_Z
-    costs = fitter.costs_beside(fit, points.reshape(-1, len(z))).reshape(points.shape[:2])
+    costs = fitter.residuals.costs(fit.points(points.reshape(-1, len(z))))
+    costs = costs.reshape(points.shape[:2])
     beside = np.pad(costs, ((0, 0), (1, 1)), constant_values=np.inf)
     is_least = (costs <= beside[:, :-2]) & (costs <= beside[:, 2:])
     return np.concatenate([z[None], points[is_least]])

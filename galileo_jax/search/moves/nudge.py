@@ -47,7 +47,9 @@ def elsewhere(fitter: GradientFitter, fit: GradientFit) -> np.ndarray:
     is_asked = is_open | (np.abs(where - z[which]) > FAR_SDS * sd[which])
     which, where, is_open = (each[is_asked] for each in (which, where, is_open))
     points = np.stack([z, *np.where(np.arange(count) == which[:, None], where[:, None], z)])
-    left = fitter.costs_beside(fit, points) - 0.5 * np.sum(points**2, axis=1)  # without the prior
+    left = fitter.residuals.costs(fit.points(points)) - 0.5 * np.sum(
+        points**2, axis=1
+    )  # without the prior
     worse = left[1:] - left[0]
     shows = np.where(is_open, np.abs(worse) > CHANGED_NATS, worse < BEHIND_IN_SEARCH)
     return points[1:][shows]

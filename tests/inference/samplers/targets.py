@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.samplers import LogDensity
+from galileo_jax.inference.samplers.sampler import LogDensity
 
 
 class Target(NamedTuple):
@@ -60,3 +60,14 @@ def two_valleys(dim: int = 4) -> Target:
     covariance = np.diag(np.full(dim, weights @ sds**2))
     covariance[0, 0] += weights[0] * weights[1] * APART**2
     return Target(log_density, mean.astype(np.float32), covariance.astype(np.float32))
+
+
+def dispersed_starts(key: jax.Array, mean, covariance, num_chains: int) -> jax.Array:
+    """Starting positions `[chain, dim]` ~ N(mean, 2 covariance).
+
+    Wider than the posterior, so that R-hat can see chains that have not yet met.
+    """
+    mean = jnp.asarray(mean)
+    cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, mean.dtype))
+    noise = jax.random.normal(key, (num_chains, *mean.shape), mean.dtype)
+    return mean + jnp.sqrt(2.0).astype(mean.dtype) * noise @ cholesky.T

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference.posterior import Status
-from galileo_jax.inference.samplers import Settings, dispersed_starts, sample
+from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.inference.samplers.library.mixture import Mixture
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.runtime.errors import InputError
-from tests.inference.samplers.targets import gaussian
+from tests.inference.samplers.targets import dispersed_starts, gaussian
 
 TARGET = gaussian(3)
 NAMES = ("a", "b", "c")
@@ -65,11 +65,6 @@ def test_log_density_belongs_to_the_draws():
     posterior = run()
     expected = jax.vmap(jax.vmap(TARGET.log_density))(jnp.asarray(posterior.draws))
     np.testing.assert_allclose(posterior.log_density, expected, atol=1e-4)
-
-
-def test_thinning_keeps_every_third_draw():
-    thinned = run(settings=Settings(50, 25, 100, thin=3, stops_early=False))
-    np.testing.assert_array_equal(thinned.draws, run().draws[:, 2::3])
 
 
 def gaussian_code(data, z):
@@ -255,7 +250,7 @@ def test_wrong_shapes_and_settings_are_refused():
         run(start=jnp.zeros((4, 2)))
     with pytest.raises(ValueError, match="max_steps is 110, not a multiple of block_steps 25"):
         Settings(max_steps=110)
-    with pytest.raises(ValueError, match="thin is 0; it must be at least 1"):
-        Settings(thin=0)
+    with pytest.raises(ValueError, match="block_steps is 0; it must be at least 1"):
+        Settings(block_steps=0)
     with pytest.raises(ValueError, match="block_steps is 12; mixture makes 5 steps at a time"):
         run(settings=Settings(warmup_steps=0, block_steps=12, max_steps=24))

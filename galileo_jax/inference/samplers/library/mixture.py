@@ -1,29 +1,22 @@
 """The default sampler: a Student-t independence kernel mixed with the random walk."""
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
-from galileo_jax.inference.samplers.library.random_walk import (
-    TARGET_ACCEPTANCE,
-    optimal_log_scale,
+from galileo_jax.inference.samplers.sampler import (
+    SAMPLERS,
+    Info,
+    LogDensity,
+    State,
+    TunedSampler,
+    metropolis_hastings,
 )
-from galileo_jax.inference.samplers.registry import register
-from galileo_jax.inference.samplers.sampler import AbstractTunedSampler, LogDensity, State
 
 
-class MixtureInfo(NamedTuple):
-    """As `Info`; `is_independent` says which of the two kernels made the step."""
-
-    acceptance_rate: jax.Array
-    is_accepted: jax.Array
-    is_independent: jax.Array
-
-
-@register
-class Mixture(AbstractTunedSampler):
+@SAMPLERS.register
+class Mixture(TunedSampler):
     """Turns of five Metropolis-Hastings steps: one of a random walk, four independent ones.
 
         the first:   y ~ N(x, s^2 L L^T), accepted with min(1, p(y) / p(x))
@@ -50,39 +43,9 @@ class Mixture(AbstractTunedSampler):
     steps_per_turn: ClassVar[int] = 5
     degrees_of_freedom: ClassVar[float] = 10.0
 
-    mean: jax.Array  # [dim]
-    cholesky: jax.Array  # [dim, dim], of the density's covariance
-    log_scale: jax.Array  # [], of the random walk
-
-    @classmethod
-    def from_gaussian(cls, mean, covariance) -> "Mixture":
-        """Both kernels from the same mean and covariance."""
-        mean = jnp.asarray(mean)
-        cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, mean.dtype))
-        scale = jnp.asarray(optimal_log_scale(mean.shape[0]), mean.dtype)
-        return cls(mean=mean, cholesky=cholesky, log_scale=scale)
-
-    def fitted(self, mean, covariance) -> "Mixture":
-        """New mean and covariance, same scale of the random walk."""
-        mean = jnp.asarray(mean, self.mean.dtype)
-        cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, self.mean.dtype))
-        return type(self)(mean=mean, cholesky=cholesky, log_scale=self.log_scale)
-
-    @property
-    def covariance(self) -> jax.Array:
-        """Of the density; the t has this times df / (df - 2)."""
-        return self.cholesky @ self.cholesky.T
-
-    def rescaled(self, info: MixtureInfo, gain) -> "Mixture":
-        """Robbins-Monro from the random walk's steps only."""
-        excess = jnp.where(info.is_independent, 0.0, info.acceptance_rate - TARGET_ACCEPTANCE)
-        change = gain * self.steps_per_turn * jnp.mean(excess)
-        scale = self.log_scale + change.astype(self.log_scale.dtype)
-        return type(self)(mean=self.mean, cholesky=self.cholesky, log_scale=scale)
-
     def turn(
         self, key: jax.Array, state: State, log_density: LogDensity
-    ) -> tuple[State, tuple[State, MixtureInfo]]:
+    ) -> tuple[State, tuple[State, Info]]:
         """A step of the random walk and four independent ones."""
         proposal_key, step_key = jax.random.split(key)
         proposals = self._proposals(proposal_key, state.position)
@@ -100,7 +63,6 @@ class Mixture(AbstractTunedSampler):
             state, info = metropolis_hastings(
                 key, state, lambda _: value, lambda key, x: proposal, proposal_log_density
             )
-            info = MixtureInfo(info.acceptance_rate, info.is_accepted, is_independent)
             return state, (state, info)
 
         keys = jax.random.split(step_key, self.steps_per_turn)
