@@ -18,8 +18,7 @@ from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.moves import jolt, prefix
-from galileo_jax.search.start import Start
-from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Stakes, Table
+from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Stakes, Start, Table
 
 NUM_LOOKS = 3  # round a fit, each from a better one
 

@@ -26,8 +26,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.moves import MOVES, Move
 from galileo_jax.search.score_tests import score_tests
-from galileo_jax.search.start import Start
-from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Key, Table, ask
+from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Key, Start, Table, ask
 
 MOST_ROUNDS = 4
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown

@@ -23,8 +23,7 @@ from galileo_jax.search.score_tests import (
     slopes_along,
     strength_of,
 )
-from galileo_jax.search.start import Start
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NUM_SCATTERED = 32  # over all priors, of a hypothesis of several effects
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96

@@ -1,4 +1,4 @@
-"""The table of all hypotheses that a search has fitted so far."""
+"""The table of all hypotheses that a search has fitted so far, and a start of another one."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.forms import FORM_NAMES
-from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.hypothesis import Hypothesis, reduced
 
 BASE: frozenset[str] = frozenset()
 Key = frozenset[str]
@@ -33,6 +33,40 @@ class Stakes:
     ) -> Bool[np.ndarray, " row"]:
         """On which hypotheses the conclusion may hang; these are searched for with care."""
         return np.zeros(len(log_odds), bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A place in the space of all parameters from which a hypothesis is searched for.
+
+    Attributes:
+      effects: of the hypothesis.
+      z: `[model parameter]`, each with a unit normal prior.
+      parent: what it was made from, None where nothing was known; with its last effect added, a
+        score test says what that effect explains.
+      move: name of the move that proposes it.
+      rivals: of a move's starts of a hypothesis with the same label only the best is followed.
+      is_near: whether it is refined at once: beside a fit a race, which assumes more noise, would
+        not tell the valleys apart.
+      cost: where a race ended, nats; there `z` is.
+      promise: that less what the width of the valley is worth.
+      num_agreeing: starts of the race that ended in its valley; 0: there was none.
+    """
+
+    effects: tuple[str, ...]
+    z: Float[np.ndarray, " parameter"]
+    parent: Hypothesis | None
+    move: str
+    rivals: int = 0
+    is_near: bool = False
+    cost: float = np.nan
+    promise: float = np.nan
+    num_agreeing: int = 0
+
+    @property
+    def key(self) -> Key:
+        """The effects in no order."""
+        return frozenset(self.effects)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +204,23 @@ class Table:
             for parent, effects in wanted
             if ask(move, parent, frozenset(effects)) not in self.asked
         ]
+
+    def replacements(
+        self, num_leaders: int
+    ) -> list[tuple[Hypothesis, str, Hypothesis, tuple[str, ...]]]:
+        """Leaders, one of their effects, what they are without it, and with which others instead.
+
+        Forms without a name take only the place of a single effect.
+        """
+        found = []
+        for leader in self.leaders(num_leaders):
+            for one in leader.effects:
+                kept = tuple(name for name in leader.effects if name != one)
+                parent = reduced(self.trials, leader, kept)
+                for name in self.library if kept else self.trials.all_effects:
+                    if name not in leader.effects:
+                        found.append((leader, one, parent, (*kept, name)))
+        return found
 
     def is_better_than(self, other: "Table") -> bool:
         """Whether it has a fit that another table has not."""

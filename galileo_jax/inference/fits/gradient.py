@@ -65,8 +65,8 @@ SETTLED = (Code.CONVERGED, Code.MISFIT)
 class GradientFitter:
     """Descends on the residuals of trials, for any hypotheses.
 
-    In arguments `z` is `[point, model parameter]`, `free` likewise (`JointProblem.free`), and `owner`
-    `[point]`: which hypothesis each point belongs to, from 0.
+    Of arguments `z` and `free` (`JointProblem.free`) are `[point, model parameter]`, and `owner`
+    `[point]` is which hypothesis each point belongs to, from 0.
 
     Attributes:
       trials: what is fitted.

@@ -8,8 +8,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
 
-from galileo_jax.search.start import Start
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 Move = Callable[[Table], list[Start]]
 

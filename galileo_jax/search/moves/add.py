@@ -2,9 +2,8 @@
 
 from itertools import combinations
 
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import beside
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NAME = "add"
 

@@ -3,15 +3,16 @@
 What acts in one place is met by few starts. Where it is known, only the strength is to be found.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import in_units
-from galileo_jax.search.hypothesis import Hypothesis, reduced
+from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.score_tests import strength_of
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import best_strengths
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NAME = "copy_shape"
 NUM_LEADERS = 2
@@ -20,25 +21,17 @@ NUM_LEADERS = 2
 def propose(table: Table) -> list[Start]:
     """The leading hypotheses with another effect that has the same kind of shape."""
     trials, starts = table.trials, list[Start]()
-    for leader in table.leaders(NUM_LEADERS):
-        for one in leader.effects:
-            kept = tuple(name for name in leader.effects if name != one)
-            others = table.library if kept else trials.all_effects
-            parent = reduced(trials, leader, kept)
-            wanted = [(parent, (*kept, name)) for name in others if name not in leader.effects]
-            for _, effects in table.not_asked(NAME, wanted):
-                z = with_shape_of(trials, leader, one, effects[-1])
-                if z is not None:
-                    starts.append(Start(effects, z, parent, NAME))
+    for leader, one, parent, effects in table.replacements(NUM_LEADERS):
+        z = with_shape_of(trials, leader, one, effects[-1])
+        if z is not None and table.not_asked(NAME, [(parent, effects)]):
+            starts.append(Start(effects, z, parent, NAME))
     if not starts:
         return []
-    z, free = np.stack([one.z for one in starts]), table.free([one.effects for one in starts])
-    z = np.where(free, z, 0.0)
-    where = [strength_of(trials, one.effects[-1])[0] for one in starts]
+    free = table.free([start.effects for start in starts])
+    z = np.where(free, np.stack([start.z for start in starts]), 0.0)
+    where = [strength_of(trials, start.effects[-1])[0] for start in starts]
     best = best_strengths(table.fitter, z, free, where)
-    return [
-        Start(one.effects, own, one.parent, NAME) for one, own in zip(starts, best, strict=True)
-    ]
+    return [replace(start, z=own) for start, own in zip(starts, best, strict=True)]
 
 
 def with_shape_of(

@@ -18,9 +18,8 @@ from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import in_units
 from galileo_jax.search.hypothesis import Hypothesis, reduced
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import positive_nuisances
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NAME = "drop"
 NUM_LEADERS = 3

@@ -8,9 +8,8 @@ import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import positive_nuisances
-from galileo_jax.search.table import BASE, Table
+from galileo_jax.search.table import BASE, Start, Table
 
 NAME = "jolt"
 MOST_JOLTED = 6  # those that the loop refines with care

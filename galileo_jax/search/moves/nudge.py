@@ -13,8 +13,7 @@ import numpy as np
 from galileo_jax.inference.fits.descent import BEHIND_IN_SEARCH
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.search.start import Start
-from galileo_jax.search.table import CHANGED_NATS, Table
+from galileo_jax.search.table import CHANGED_NATS, Start, Table
 
 NAME = "nudge"
 MOVED_Z = (-1.0, -0.5, 0.5, 1.0)
@@ -47,9 +46,8 @@ def elsewhere(fitter: GradientFitter, fit: GradientFit) -> np.ndarray:
     is_asked = is_open | (np.abs(where - z[which]) > FAR_SDS * sd[which])
     which, where, is_open = (each[is_asked] for each in (which, where, is_open))
     points = np.stack([z, *np.where(np.arange(count) == which[:, None], where[:, None], z)])
-    left = fitter.residuals.costs(fit.points(points)) - 0.5 * np.sum(
-        points**2, axis=1
-    )  # without the prior
+    of_prior = 0.5 * np.sum(points**2, axis=1)
+    left = fitter.residuals.costs(fit.points(points)) - of_prior
     worse = left[1:] - left[0]
     shows = np.where(is_open, np.abs(worse) > CHANGED_NATS, worse < BEHIND_IN_SEARCH)
     return points[1:][shows]

@@ -20,9 +20,8 @@ from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.laws.pucks import START
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import absent_z, scattered_round
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NAME = "prefix"
 NUM_STARTS, NUM_FOLLOWED = 128, 8

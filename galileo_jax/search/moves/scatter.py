@@ -7,9 +7,8 @@ effect may all miss a valley, and a fit of one effect bends all else to do what 
 from itertools import combinations
 
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.search.start import Start
 from galileo_jax.search.starts import scattered_starts
-from galileo_jax.search.table import Table
+from galileo_jax.search.table import Start, Table
 
 NAME = "scatter"
 NUM_LEADERS, NUM_CROSSED = 3, 4
