@@ -1,5 +1,7 @@
 """A random function of time as a few patterns, each with an independent amplitude."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 
@@ -17,3 +19,16 @@ def random_patterns(
     values, vectors = np.linalg.eigh(covariance)
     large = values > smallest * values[-1]
     return (np.sqrt(values[large]) * vectors[:, large]).T
+
+
+def alone(
+    position: Float[np.ndarray, "object axis frame"],
+    i: int,
+    axis: int,
+    values: Any,
+    frames: slice = slice(None),
+) -> Float[np.ndarray, "object axis frame"]:
+    """A pattern of the shape of `position` that moves object i along an axis in some frames."""
+    found = np.zeros_like(position)
+    found[i, axis, frames] = values
+    return found

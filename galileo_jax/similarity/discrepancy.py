@@ -13,7 +13,7 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
+from galileo_jax.observation.random_patterns import SMALLEST, alone, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
 from galileo_jax.similarity.rocking_discrepancy import rocking, rocking_frames, rocking_steps
 
@@ -46,16 +46,12 @@ ASIDE_SD_M = 1.0
 
 def offsets(observation: Observation) -> list[np.ndarray]:
     """The modes of a track as a whole: with these alone, displacements are what counts."""
-    count, axes, frames = observation.position_m.shape
-    found = []
-    for i in range(count):
-        for axis in range(axes):
-            offset = np.zeros((count, axes, frames))
-            # Paths begin where the object is first seen, within that frame's error.
-            seen = int(np.argmax(observation.mask[i]))
-            error = observation.covariance_m2[i, axis, axis, seen]
-            offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
-            found.append(offset)
+    place, found = observation.position_m, []
+    for i, axis in np.ndindex(place.shape[:2]):
+        # Paths begin where the object is first seen, within that frame's error.
+        seen = int(np.argmax(observation.mask[i]))
+        error = observation.covariance_m2[i, axis, axis, seen]
+        found.append(alone(place, i, axis, math.sqrt(OFFSET_SD_M**2 + error)))
     return found
 
 
@@ -68,14 +64,9 @@ def wander(
     """For each object and axis of a track a slow wander (Ornstein-Uhlenbeck)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
     patterns = random_patterns(sd_m**2 * np.exp(-apart / lasts_s), smallest)
-    count, axes, _ = observation.position_m.shape
-    found = []
-    for i in range(count):
-        for axis in range(axes):
-            own = np.zeros((len(patterns), *observation.position_m.shape))
-            own[:, i, axis] = patterns
-            found.extend(own)
-    return found
+    place = observation.position_m
+    each = np.ndindex(place.shape[:2])
+    return [alone(place, i, axis, own) for i, axis in each for own in patterns]
 
 
 def modes(
@@ -99,7 +90,6 @@ def modes(
       rough_sd_m: allowed for across the path beside the wobble; 0 to draw tracks.
     """
     position = np.nan_to_num(observation.position_m)
-    count, _, frames = position.shape
     found = offsets(observation)
     if is_filmed:
         found.extend(camera(position, observation, scene))
@@ -117,15 +107,14 @@ def modes(
             edge = scene.half_length_m[i] / 2 * (1 - cos)
             along = math.hypot(POINT_SD_M * sin, edge)
             across = math.hypot(POINT_SD_M * (1 - cos), edge)
-            for axis, sd in ((0, along), (1, across)):
-                step = np.zeros((count, 2, frames))
-                step[i, axis] = sd * share
-                found.append(step)
+            sds = enumerate((along, across))
+            found += [alone(position, i, axis, sd * share) for axis, sd in sds]
     found.extend(across_path(observation, scene, rough_sd_m))
-    if not scene.has_surface and not scene.moves_in_plane:
-        found.extend(_aside(position))
+    if not scene.has_surface and not scene.moves_in_plane:  # any place across a fall
+        each = np.ndindex(len(position), position.shape[-1])
+        found += [alone(position, i, 0, ASIDE_SD_M, slice(f, f + 1)) for i, f in each]
     found.extend(after_hits(position, observation, is_filmed))
-    for i in range(count):
+    for i in range(len(position)):
         found.extend(rocking_steps(position, scene, i, _rocks(position, observation, scene, i)))
     return np.stack(found)
 
@@ -236,18 +225,6 @@ def _bent_scale(y: np.ndarray, observation: Observation) -> np.ndarray:
     return np.stack([np.zeros_like(y), bend], axis=1)
 
 
-def _aside(position: np.ndarray) -> list[np.ndarray]:
-    """For each object and frame any place across a fall."""
-    count, _, frames = position.shape
-    found = []
-    for i in range(count):
-        for frame in range(frames):
-            aside = np.zeros_like(position)
-            aside[i, 0, frame] = ASIDE_SD_M
-            found.append(aside)
-    return found
-
-
 def crossings(observation: Observation, scene: Surroundings) -> np.ndarray:
     """Modes of each single frame in which an object lies across the foot, as `modes`.
 
@@ -255,20 +232,16 @@ def crossings(observation: Observation, scene: Surroundings) -> np.ndarray:
     (length / 4) sin(angle); half of that is taken as the standard deviation.
     """
     position = np.nan_to_num(observation.position_m)
-    found = [np.zeros((0, *position.shape))]
+    found = []
     for i, comes_down in enumerate(scene.comes_down):
         if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
             frames = np.flatnonzero((share > 0) & (share < 1) & observation.mask[i])
-            own = np.zeros((2, len(frames), *position.shape))
             size = scene.half_length_m[i] / 4 * math.sin(scene.angle_rad)
-            for axis in range(2):
-                own[axis, np.arange(len(frames)), i, axis, frames] = size
-            found.extend(own)
-        alone = rocking_frames(position, scene, i, _rocks(position, observation, scene, i))
-        if alone:
-            found.append(np.stack(alone))
-    return np.concatenate(found)
+            each = ((axis, slice(frame, frame + 1)) for axis in range(2) for frame in frames)
+            found += [alone(position, i, axis, size, frame) for axis, frame in each]
+        found += rocking_frames(position, scene, i, _rocks(position, observation, scene, i))
+    return np.array(found).reshape(-1, *position.shape)
 
 
 def _rocks(

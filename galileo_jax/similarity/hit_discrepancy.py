@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import random_patterns
+from galileo_jax.observation.random_patterns import alone, random_patterns
 from galileo_jax.statespace.kinematics import STILL_M_S, first_moved
 
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
@@ -40,13 +40,11 @@ def after_hits(position: np.ndarray, observation: Observation, is_filmed: bool) 
 
 def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.ndarray]:
     """What a hit in frame `hit` leaves behind in either object's motion."""
-    x = position[:, 0]
     found = []
     for i in objects:
-        way, step = np.zeros_like(position), np.zeros_like(position)
-        way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
-        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
-        found.extend([way, step])
+        way = position[i, 0, hit:] - position[i, 0, hit]
+        found.append(alone(position, i, 0, IMPULSE_SD * way, slice(hit, None)))
+        found.append(alone(position, i, 0, HIT_STEP_SD_M, slice(hit + 1, None)))
     return found
 
 
@@ -163,10 +161,5 @@ def _drift(
     apart_s = (after[:, None] - after) / HIT_DRIFT_S
     sd_m = OWN_DRIFT_SD_M if observation.is_tracked_here else HIT_DRIFT_SD_M
     patterns = random_patterns(sd_m**2 * np.exp(-0.5 * apart_s**2))
-    found = []
-    for i in objects:
-        for pattern in patterns:
-            drift = np.zeros_like(position)
-            drift[i, 0, hit + 1 :] = pattern
-            found.append(drift)
-    return found
+    after_hit = slice(hit + 1, None)
+    return [alone(position, i, 0, own, after_hit) for i in objects for own in patterns]

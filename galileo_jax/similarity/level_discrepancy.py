@@ -13,6 +13,7 @@ import numpy as np
 from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import alone
 from galileo_jax.similarity.discrepancy import (
     WOBBLE_S,
     WOBBLE_SD_M,
@@ -31,31 +32,25 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
     position = np.nan_to_num(observation.position_m)
     found = offsets(observation)
     if is_filmed:
+        turning = position.shape[1] - 2
         for pattern in camera(position[:, :2], observation, scene):
-            own = np.zeros_like(position)
-            own[:, :2] = pattern[:, :2]
-            found.append(own)
+            found.append(np.pad(pattern[:, :2], [(0, 0), (0, turning), (0, 0)]))
         size_m = WOBBLE_SD_M if observation.wander_m is None else observation.wander_m
         found.extend(wander(observation, size_m, WOBBLE_S, smallest=0.0))
+    hits = list[tuple[int, int]]()  # frame and object
     for i, j in combinations(range(len(position)), 2):
         both = observation.mask[i] & observation.mask[j]
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
         apart = np.where(both, apart, np.inf)
-        if apart.min() > NEAR * (scene.half_length_m[i] + scene.half_length_m[j]):
-            continue
-        hit = int(np.argmin(apart))
-        for k in (i, j):
-            for axis in range(2):
-                step = np.zeros_like(position)
-                step[k, axis, hit + 1 :] = HIT_STEP_SD_M
-                found.append(step)
+        if apart.min() <= NEAR * (scene.half_length_m[i] + scene.half_length_m[j]):
+            hits += [(int(np.argmin(apart)), i), (int(np.argmin(apart)), j)]
     for i, ends in product(range(len(position)), scene.walls_m):
-        seen = observation.mask[i]
-        for hit in bounces(position[i, :2], seen, ends, scene.half_length_m[i]):
-            for axis in range(2):
-                step = np.zeros_like(position)
-                step[i, axis, hit + 1 :] = HIT_STEP_SD_M
-                found.append(step)
+        half_m = scene.half_length_m[i]
+        at_wall = bounces(position[i, :2], observation.mask[i], ends, half_m)
+        hits += [(frame, i) for frame in at_wall]
+    for hit, i in hits:
+        later = slice(hit + 1, None)
+        found += [alone(position, i, axis, HIT_STEP_SD_M, later) for axis in range(2)]
     turned = position[:, 2] if observation.is_turning else observation.turned_rad
     if turned is not None:
         found.extend(_off_centre(position, turned, scene))

@@ -11,6 +11,7 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import alone
 
 RISES_M = 1.2e-3  # three times what bodies wobble across their path (`discrepancy.WOBBLE_SD_M`)
 CLEAR = 5.0  # standard deviations of a frame
@@ -80,10 +81,9 @@ def rocking_steps(
     """For each time that object `i` rocks, the step that it leaves behind in its way."""
     found = []
     for frames, rise in when:
-        step = np.zeros_like(position)
         done = np.arange(position.shape[-1]) - frames.start + 1
-        step[i, 0] = _ahead(rise, scene, i) * np.clip(done / (frames.stop - frames.start), 0.0, 1.0)
-        found.append(step)
+        share = np.clip(done / (frames.stop - frames.start), 0.0, 1.0)
+        found.append(alone(position, i, 0, _ahead(rise, scene, i) * share))
     return found
 
 
@@ -91,14 +91,12 @@ def rocking_frames(
     position: np.ndarray, scene: Surroundings, i: int, when: list[tuple[slice, float]]
 ) -> list[np.ndarray]:
     """The modes of each single frame in which object `i` rocks."""
-    found = []
-    for frames, rise in when:
-        for frame in range(frames.start, frames.stop):
-            for axis, size in ((0, _ahead(rise, scene, i)), (1, rise)):
-                mode = np.zeros_like(position)
-                mode[i, axis, frame] = size
-                found.append(mode)
-    return found
+    return [
+        alone(position, i, axis, size, slice(frame, frame + 1))
+        for frames, rise in when
+        for frame in range(frames.start, frames.stop)
+        for axis, size in ((0, _ahead(rise, scene, i)), (1, rise))
+    ]
 
 
 def _ahead(rise_m: float, scene: Surroundings, i: int) -> float:
