@@ -196,10 +196,10 @@ def _of_clip(how: Rolled, part: Part, z: jax.Array, noise: jax.Array) -> jax.Arr
     is_over = jnp.arange(how.num_records) > part.last_record
     end = jnp.take(position, part.last_record, axis=-1)[..., None]
     position, velocity = jnp.where(is_over, end, position), jnp.where(is_over, 0.0, velocity)
-    left = left_of(kind, theta, position, velocity, clip.data, clip.scene)
+    left = left_of(kind, theta, position, velocity, clip)
     along2 = jnp.einsum("kmn,n->km", part.turned, part.basis @ left) ** 2
     found = GaussianLikelihood.log_density_by_modes(
-        jnp.sum(left**2), along2, noise, part.gain, clip.data.whitening.num_values
+        jnp.sum(left**2), along2, noise, part.gain, clip.whitening.num_values
     )
     return jnp.where(jnp.any(jnp.abs(left) >= FAILED), -jnp.inf, found)
 
@@ -208,14 +208,14 @@ def _covariances(clip: FittedClip, draws: list[Sizes]) -> tuple[np.ndarray, np.n
     """Basis, turned and gain of a `Part`, padded as the clip is."""
     whole = clip.problem.with_sizes(_largest(draws)).data
     basis = whole.basis.reshape(len(whole.gain), -1)
-    count = max(rounded_up(len(basis), FRAMES), len(clip.data.whitening.gain))
+    count = max(rounded_up(len(basis), FRAMES), len(clip.whitening.gain))
     turned, gain = np.zeros((len(draws), count, count)), np.zeros((len(draws), count))
     for k, sizes in enumerate(draws):
         data = clip.problem.with_sizes(sizes).data
         patterns = data.gain[:, None] * data.basis.reshape(len(data.gain), -1)
         _, own, vectors = np.linalg.svd(patterns @ basis.T, full_matrices=False)
         turned[k, : len(own), : len(basis)], gain[k, : len(own)] = vectors, own
-    frames = clip.data.whitening.observed_m.shape[-1] - whole.basis.shape[-1]
+    frames = clip.whitening.observed_m.shape[-1] - whole.basis.shape[-1]
     padded = np.pad(whole.basis, [(0, count - len(basis)), (0, 0), (0, 0), (0, frames)])
     return padded.reshape(count, -1), turned, gain
 

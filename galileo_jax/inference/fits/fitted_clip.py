@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.inference.fits.kernels import ClipArrays, Kind, Padded
+from galileo_jax.inference.fits.kernels import ClipArrays, Kind
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import PriorTable
@@ -19,30 +19,26 @@ class FittedClip:
 
     Attributes:
       problem: of the clip.
-      column: `[own parameter]`, where its model's parameters stand among those of all clips.
-      priors: of its parameters.
-      absent: `[own parameter]`, values in their units where pinned.
-      data: padded.
-      on_device: all that its programs need.
+      host: all that its programs need, padded.
+      on_device: the same.
     """
 
     problem: Problem
-    column: np.ndarray
-    priors: PriorTable
-    absent: np.ndarray
-    data: Padded
+    host: ClipArrays
     on_device: OnDevice[ClipArrays]
 
     @classmethod
     def of(cls, trials: JointProblem, index: int) -> "FittedClip":
         """The clip of that index."""
-        problem, column = trials.problems[index], trials.columns[index]
-        parameters = problem.parameters
-        priors, data = PriorTable.of(parameters), _padded(problem)
-        absent = np.array([p.absent for p in parameters])
-        scene = problem.model.scene.surroundings
-        arrays = OnDevice(ClipArrays(data, scene, priors, absent, column))
-        return cls(problem, column, priors, absent, data, arrays)
+        problem = trials.problems[index]
+        host = ClipArrays(
+            *_padded(problem),
+            problem.model.scene.surroundings,
+            PriorTable.of(problem.parameters),
+            np.array([p.absent for p in problem.parameters]),
+            trials.columns[index],
+        )
+        return cls(problem, host, OnDevice(host))
 
     @property
     def kind(self) -> Kind:
@@ -54,10 +50,15 @@ class FittedClip:
         """All that its programs need."""
         return self.on_device()
 
+    @property
+    def whitening(self) -> Whitening:
+        """Its covariance, padded."""
+        return self.host.whitening
+
     def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """`[point, joint parameter]` to this clip's parameters in their units."""
-        own, is_free = z[:, self.column], free[:, self.column]
-        return np.where(is_free, self.priors.in_units(own), self.absent)
+        column, priors, absent = self.host.column, self.host.priors, self.host.absent
+        return np.where(free[:, column], priors.in_units(z[:, column]), absent)
 
     def search_noise(self, search_sd_m: float) -> float:
         """The noise scale at which the tracker's median error is that."""
@@ -69,14 +70,13 @@ class FittedClip:
 
     def unpadded(self, jacobian: np.ndarray) -> np.ndarray:
         """Rows of real frames only."""
-        shape = self.data.whitening.observed_m.shape
         frames = len(self.problem.observation.times_s)
-        rows = jacobian.reshape(*shape, -1)[:, :, :frames]
+        rows = jacobian.reshape(*self.whitening.observed_m.shape, -1)[:, :, :frames]
         return rows.reshape(-1, jacobian.shape[1])
 
 
-def _padded(problem: Problem) -> Padded:
-    """Pads with frames that count for nothing and modes without gain."""
+def _padded(problem: Problem) -> tuple[np.ndarray, Whitening]:
+    """Times and whitening with frames that count for nothing and modes without gain."""
     times, data = problem.observation.times_s, problem.data
     frames = rounded_up(len(times), FRAMES) - len(times)
     # A camera's wobble has as many modes as frames; all else has fewer than those to spare.
@@ -84,11 +84,10 @@ def _padded(problem: Problem) -> Padded:
     is_few = problem.noise != "camera" and len(data.gain) <= SPARE_MODES
     modes = SPARE_MODES if is_few else max(rounded_up(len(data.gain), FRAMES), most)
     modes -= len(data.gain)
-    whitening = Whitening(
+    return np.pad(times, (0, frames), mode="edge"), Whitening(
         np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
         np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
         np.pad(data.basis, [(0, modes), (0, 0), (0, 0), (0, frames)]),
         np.pad(data.gain, (0, modes)),
         data.num_values,
     )
-    return Padded(np.pad(times, (0, frames), mode="edge"), whitening)

@@ -167,7 +167,7 @@ class GradientFitter:
 
     def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
         """Whether `noise_explains` what it leaves."""
-        data = [clip.data.whitening for clip in self.residuals.clips]
+        data = [clip.whitening for clip in self.residuals.clips]
         degrees = sum(float(GaussianLikelihood.degrees(1.0, own)) for own in data)
         return noise_explains(fit.chi2, degrees - fit.num_used, noise_scale)
 

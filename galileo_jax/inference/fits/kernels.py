@@ -32,18 +32,6 @@ class Kind(NamedTuple):
     record_dt_s: float
 
 
-class Padded(NamedTuple):
-    """A clip's data in shapes that many clips share, so that they share compiled code.
-
-    Attributes:
-      times_s: `[frame]`.
-      whitening: with masked frames and idle modes added.
-    """
-
-    times_s: np.ndarray
-    whitening: Whitening
-
-
 class Quadratic(NamedTuple):
     """A cost and its Gauss-Newton approximation, of each of several points.
 
@@ -61,44 +49,52 @@ class Quadratic(NamedTuple):
 
 
 class ClipArrays(NamedTuple):
-    """What compiled code needs of a clip, traced."""
+    """What compiled code needs of a clip, in shapes that many clips share.
 
-    data: Padded
+    Attributes:
+      times_s: `[frame]`.
+      whitening: with masked frames and idle modes added.
+      scene: what it shows.
+      priors: of its parameters.
+      absent: `[own parameter]`, values in their units where pinned.
+      column: `[own parameter]`, where these stand among those of all clips.
+    """
+
+    times_s: np.ndarray
+    whitening: Whitening
     scene: Surroundings
     priors: PriorTable
     absent: np.ndarray
     column: np.ndarray
 
 
-def left_of(kind: Kind, theta, position, velocity, data: Any, scene):
+def left_of(kind: Kind, theta, position, velocity, clip: ClipArrays):
     """Residuals of one motion in units of the stated errors, `[value]`."""
-    difference = _difference_m(kind, theta, position, velocity, data, scene)
-    left = jnp.einsum("oijt,ojt->oit", data.whitening.inverse_root, difference).reshape(-1)
+    difference = _difference_m(kind, theta, position, velocity, clip)
+    left = jnp.einsum("oijt,ojt->oit", clip.whitening.inverse_root, difference).reshape(-1)
     return jnp.where(jnp.abs(left) < FAILED, left, FAILED)
 
 
-def white_of(kind: Kind, theta, position, velocity, noise, data: Any, scene):
+def white_of(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
     """Whitened residuals of one motion, `[value]`."""
-    difference = _difference_m(kind, theta, position, velocity, data, scene)
-    white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
+    difference = _difference_m(kind, theta, position, velocity, clip)
+    white = GaussianLikelihood.whiten(difference, noise, clip.whitening).reshape(-1)
     return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
 
 
-def _difference_m(kind: Kind, theta, position, velocity, data: Any, scene):
+def _difference_m(kind: Kind, theta, position, velocity, clip: ClipArrays):
     """Observed minus predicted, `[object, axis, frame]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
     motion = Trajectory(times, position, velocity)
-    predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
-    return data.whitening.observed_m - predicted
+    predicted = seen(kind.effects, kind.names, theta, motion, clip.times_s, clip.scene)
+    return clip.whitening.observed_m - predicted
 
 
 @trace_cached(num_static=1)
-def white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
+def white_batch(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
     """Whitened residuals of many motions, `[point, value]`."""
-    return jax.vmap(lambda t, p, v, n: white_of(kind, t, p, v, n, data, scene))(
-        theta, position, velocity, noise
-    )
+    return jax.vmap(lambda *one: white_of(kind, *one, clip))(theta, position, velocity, noise)
 
 
 @trace_cached(num_static=1)
@@ -113,7 +109,7 @@ def seen_slopes_batch(kind: Kind, z, free, noise, index, position, velocity, cli
         def residuals(u):
             own = z.at[index].add(u, mode="drop")[clip.column]
             theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
-            return white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
+            return white_of(kind, theta, position, velocity, noise, clip)
 
         zero = jnp.zeros(index.shape[0])
         return residuals(zero), jax.jacfwd(residuals)(zero)

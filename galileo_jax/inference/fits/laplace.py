@@ -130,7 +130,7 @@ def _laplace_fit(
         free=free,
         covariance=covariance,
         chi2=sum(
-            float(np.sum(errors_at(w[None], s[None], np.ones(1), clip.data.whitening) ** 2))
+            float(np.sum(errors_at(w[None], s[None], np.ones(1), clip.whitening) ** 2))
             for w, s, clip in zip(white, scale, clips, strict=True)
         ),
         log_evidence=_log_evidence(z, scale, white, covariance[np.ix_(free, free)], residuals),
@@ -152,7 +152,7 @@ def _covariance(
     whole = np.zeros((count + len(scale),) * 2)
     whole[np.ix_(own, own)] = inverse(normal[np.ix_(own, own)])
     for c, (clip, s) in enumerate(zip(residuals.clips, scale, strict=True)):
-        information = float(GaussianLikelihood.information(s, clip.data.whitening))
+        information = float(GaussianLikelihood.information(s, clip.whitening))
         whole[count + c, count + c] = 1 / (1 + information * NOISE_SD**2)
     return whole
 
@@ -167,5 +167,5 @@ def _log_evidence(
     """Laplace: the density at the mode times the posterior's volume over the prior's."""
     total = -float(cost(white, z)) - 0.5 * float(np.sum((np.log(scale) / NOISE_SD) ** 2))
     for clip, s in zip(residuals.clips, scale, strict=True):
-        total -= 0.5 * float(GaussianLikelihood.log_determinant(s, clip.data.whitening))
+        total -= 0.5 * float(GaussianLikelihood.log_determinant(s, clip.whitening))
     return total + 0.5 * float(np.linalg.slogdet(covariance)[1])

@@ -64,7 +64,7 @@ def polish(
     normal, widths = np.tile(np.eye(size), (count, 1, 1)), np.tile(descent.coarse_steps, (count, 1))
     is_settled, total = np.zeros(count, bool), np.full(count, np.inf)
     active, is_alone = np.arange(count), np.ones(count, bool)
-    num_values = np.array([clip.data.whitening.num_values for clip in descent.residuals.clips])
+    num_values = np.array([clip.whitening.num_values for clip in descent.residuals.clips])
     for _ in range(MAX_ROUNDS):
         here = Batch(z, points.free, noise).take(active)
         used = size - np.trace(inverse(normal[active]), axis1=1, axis2=2)
@@ -100,10 +100,10 @@ def noise_scales(
       points: where.
       used: `[point]`, how many numbers' worth of the data the parameters take up.
     """
-    num_values = sum(float(clip.data.whitening.num_values) for clip in residuals.clips)
+    num_values = sum(float(clip.whitening.num_values) for clip in residuals.clips)
     scales = np.empty_like(points.noise)
     for c, (clip, white) in enumerate(zip(residuals.clips, residuals.whites(points), strict=True)):
-        data = clip.data.whitening
+        data = clip.whitening
         own = used * float(data.num_values) / num_values
         scales[:, c] = fitted_noise_scale(white, points.noise[:, c], own, NOISE_SD, data)
     return scales

@@ -118,7 +118,7 @@ class Residuals:
         for c, motion in enumerate(motions or self.motions(points)):
             white, jacobian = self._seen_slopes(c, points, index, motion)
             moves = np.append(self._is_simulated, False)
-            moves &= np.isin(np.arange(self._count + 1), self.clips[c].column)
+            moves &= np.isin(np.arange(self._count + 1), self.clips[c].host.column)
             point, slot = np.nonzero(moves[index])
             which = index[point, slot]
             step, rows = steps[point, which], np.arange(len(point))
@@ -155,7 +155,7 @@ class Residuals:
         """Whitened residuals of a clip, of points that were not rolled out."""
         clip = self.clips[c]
         if not len(points.z):
-            return np.zeros((0, clip.data.whitening.observed_m.size))
+            return np.zeros((0, clip.whitening.observed_m.size))
         self.num_rollouts += len(points.z)
         theta = clip.theta(points.z, points.free)
         return clip.problem.of_motions(theta, _white(clip), points.noise[:, c])
@@ -163,8 +163,7 @@ class Residuals:
 
 def _white(clip: FittedClip) -> Callable[..., Any]:
     """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
-    data, scene, *_ = clip.arrays
-    return lambda *part: white_batch(clip.kind, *part, data, scene)
+    return lambda *part: white_batch(clip.kind, *part, clip.arrays)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
