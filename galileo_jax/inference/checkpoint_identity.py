@@ -26,11 +26,8 @@ def identity_of(
 ) -> str:
     """A hash of the data, the model and the options of the chains.
 
-    Args:
-      measured: the clips.
-      problem: the model of them.
-      effects_from: files that its effects come from.
-      options: whatever else decides which chain is drawn; what JSON can hold.
+    `measured`: the clips. `effects_from`: files that its effects come from. `options`: whatever
+    else decides which chain is drawn; what JSON can hold.
 
     Raises:
       InputError: a file of `effects_from` has gone since it was run.

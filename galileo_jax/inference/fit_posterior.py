@@ -39,10 +39,7 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
     Those of the normal approximation, at the most probable sizes, where weighed draws are worth too
     few, or rollouts are slow (all engines but the rigid one in a plane).
 
-    Args:
-      trials: that were fitted.
-      fit: the best, with the valleys beside it.
-      seed: same seed, same draws.
+    `fit`: the best, with the valleys beside it.
     """
     is_quick = all(problem.engine.name == "rigid" for problem in trials.problems)
     if not is_quick or fit.code not in SETTLED or fit.free.sum() > MOST_PARAMETERS:
@@ -72,11 +69,7 @@ def to_go_on_from(
 ) -> Float[np.ndarray, "start parameter"]:
     """Starts, z of the model's parameters; none where the fits describe the posterior.
 
-    Args:
-      trials: that were fitted.
-      fits: the best of each valley, the best first; their sizes of imperfections are the trials'.
-      residuals: of the trials.
-      seed: of the draws.
+    `fits`: the best of each valley, the best first; their sizes of imperfections are the trials'.
     """
     count = len(fits[0].steps)
     if fits[0].free.sum() > MOST_PARAMETERS:

@@ -21,10 +21,8 @@ def imperfections(
     `z`, of those that have it, is the logarithm of the most probable size over its prior's median,
     in the prior's standard deviations: what a run is loaded with.
 
-    Args:
-      trials: the first clip's are the units of what depends on a clip.
-      sizes: as fitted.
-      posterior: of the parameters, how far trials differ among them.
+    `trials`: the first clip's are the units of what depends on a clip. `sizes`: as fitted.
+    `posterior`: of the parameters, how far trials differ among them.
     """
     problem, found = trials.problems[0], {}
     for name, x, drawn in zip(sizes.names, sizes.x, sizes.draws.T, strict=False):

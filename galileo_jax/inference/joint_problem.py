@@ -33,10 +33,8 @@ CHANCE = 0.01  # noise leaves as much or more so seldom: then it is something el
 def noise_explains(chi2: float, degrees: float, noise_scale: float = 1.0) -> bool:
     """Whether noise of that scale leaves a sum of squares as large once in 1 / `CHANCE` times.
 
-    Args:
-      chi2: in units of the stated noise.
-      degrees: of freedom; at least one is taken.
-      noise_scale: in these units.
+    `chi2`: in units of the stated noise. `degrees`: of freedom; at least one is taken.
+    `noise_scale`: in these units.
     """
     return bool(chdtrc(max(degrees, 1.0), chi2 / noise_scale**2) > CHANCE)
 

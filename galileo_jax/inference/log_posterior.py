@@ -130,10 +130,8 @@ def density_of(
 ) -> LogDensity:
     """The log density of one `z` in JAX; a `Program` where the engines are, which clips share.
 
-    Args:
-      trials: the clips.
-      fit: of them, over whose sizes of imperfections is integrated, if it has any.
-      valley: the density is one of its w, not of z.
+    `fit`: of them, over whose sizes of imperfections is integrated, if it has any. `valley`: the
+    density is one of its w, not of z.
     """
     draws, of_sizes = sizes_of(trials, fit, LEAST_SIZES)
     rolled, parts = [], []

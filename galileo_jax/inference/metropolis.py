@@ -125,9 +125,7 @@ def learned(valley: Valley, w: np.ndarray) -> tuple[Valley, np.ndarray, np.ndarr
     fit whose widths are wrong, at a kink of the misfit, has wrong bends, too. The determinants are
     constant, so that those of the covariances compare.
 
-    Args:
-      valley: in whose coordinates the draws were made.
-      w: `[draw, parameter]`.
+    `valley`: in whose coordinates the draws were made. `w`: `[draw, parameter]`.
     """
     z = valley(w)
     bent, straight = np.cov(w, rowvar=False), np.cov(z, rowvar=False)

@@ -63,9 +63,7 @@ def is_mass_known(trials: JointProblem, draws: np.ndarray) -> bool:
 def per_mass(trials: JointProblem, draws: np.ndarray) -> Mapping[str, tuple[np.ndarray, str]]:
     """By name, the force constants over the mass of object 1, and their units.
 
-    Args:
-      trials: what was fitted.
-      draws: `[draw, parameter]`, in the parameters' units.
+    `draws`: `[draw, parameter]`, in the parameters' units.
     """
     names = trials.names
     if "m1" not in names:

@@ -79,9 +79,7 @@ class Posterior:
     ) -> "Posterior":
         """The posterior of `function` of the parameters (such as z to theta).
 
-        Arguments:
-          function: `[..., parameter]` to `[..., len(names)]`.
-          names: of the new parameters.
+        `function`: `[..., parameter]` to `[..., len(names)]`.
         """
         return replace(self, draws=np.asarray(function(self.draws)), names=tuple(names))
 
@@ -92,9 +90,7 @@ class Posterior:
     def mixed_with(self, other: "Posterior", share: float) -> "Posterior":
         """Draws of two posteriors of the same parameters, one of which is right, in any order.
 
-        Args:
-          other: as many draws.
-          share: the probability of the other.
+        `other`: as many draws. `share`: the probability of the other.
         """
         count = self.draws.shape[1]
         num_other = round(share * count)

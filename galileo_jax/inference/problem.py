@@ -229,9 +229,7 @@ class Problem:
     def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
         """Whitened residuals, unit normal if the model is right.
 
-        Args:
-          predicted_m: `[..., object, 2, frame]`.
-          noise_scale: on the tracker's errors.
+        `predicted_m`: `[..., object, 2, frame]`. `noise_scale`: on the tracker's errors.
 
         Returns:
           `[..., object * 2 * frame]`.

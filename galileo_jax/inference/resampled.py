@@ -22,10 +22,8 @@ def resampled(
 ) -> Int[np.ndarray, " chosen"]:
     """Indices of `count` draws in random order: the first few are a sample, too.
 
-    Args:
-      log_weights: up to a constant.
-      count: n.
-      generator: of u and of the order, two numbers for each draw.
+    `log_weights`: up to a constant. `count`: n. `generator`: of u and of the order, two numbers for
+    each draw.
     """
     u, place = generator.random((2, len(log_weights)))
     weights = np.exp(log_weights - np.max(log_weights))

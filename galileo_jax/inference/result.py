@@ -50,9 +50,7 @@ def velocity_error(
 ) -> dict[str, float]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
-    Args:
-      problems: with the observations.
-      predicted_m: of each clip `[object, 2, frame]`, the fitted centres.
+    `predicted_m`: of each clip `[object, 2, frame]`, the fitted centres.
 
     Returns:
       rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and
@@ -86,9 +84,7 @@ def distance_error(
 ) -> dict[str, float]:
     """How far the points that were followed are from where the fit has them.
 
-    Args:
-      problems: with the observations.
-      predicted_m: of each clip `[object, axis, frame]`, the fitted centres.
+    `predicted_m`: of each clip `[object, axis, frame]`, the fitted centres.
 
     Returns:
       rms_mm: the root mean square of that distance, of all objects and frames, mm; NaN where
@@ -149,12 +145,7 @@ def error_of(
 
 
 def per_mass_entries(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, Any]]:
-    """Entries of the force constants over m1, by name; empty where the mass is known.
-
-    Args:
-      trials: what was fitted.
-      posterior: in the parameters' units.
-    """
+    """Entries of the force constants over m1, by name; empty where the mass is known."""
     draws = posterior.flat()
     if not force_constants(trials) or is_mass_known(trials, draws):
         return {}
@@ -178,13 +169,9 @@ def _told(
 
 
 def undetermined_by_mass(trials: JointProblem, forces: Mapping[str, Any]) -> set[str]:
-    """Masses that nothing determines, and the force constants that are known per mass only.
+    """Masses that nothing determines, and the constants of `forces`, known per mass only.
 
     Several masses tied by their ratios share what the prior says, which looks like knowledge.
-
-    Args:
-      trials: what was fitted.
-      forces: `per_mass_entries`.
     """
     names = {name.removesuffix(SUFFIX) for name in forces}
     if not is_any_weighed(trials):
@@ -229,26 +216,16 @@ def make_result(
 ) -> dict[str, Any]:
     """The contract's dictionary.
 
-    Args:
-      trials: what was fitted.
-      posterior: draws in the parameters' units.
-      z_best: `[parameter]`, the mode in z, noise scale last; errors are stated at it.
-      clips: the files fitted.
-      method: "grad", "mh" or "cnn".
-      seed: of everything random.
-      timings_s: by stage.
-      notes: what else the method has to say ("engine", "status", warnings).
+    `z_best`: `[parameter]`, the mode in z, noise scale last; errors are stated at it. `method`:
+    "grad", "mh" or "cnn". `notes`: what else the method has to say ("engine", "status", warnings).
     """
     spread = inverse(trials.parameters, np.asarray(posterior.flat())).std(axis=0)
-    table, derived = _entries(trials, posterior, spread)
+    table = _entries(trials, posterior, spread)
     forces = per_mass_entries(trials, posterior)
-    derived |= forces
-    for name in undetermined_by_mass(trials, forces):
+    untold, reason = _untold(table["parameters"], trials)
+    for name in undetermined_by_mass(trials, forces) | untold:
         if name in table["parameters"]:
             table["parameters"][name]["identified"] = False
-    untold, reason = _untold(table["parameters"], trials)
-    for name in untold:
-        table["parameters"][name]["identified"] = False
     if reason is not None:
         said = [*notes.get("warnings", []), reason]
         notes = notes | {"warnings": list(dict.fromkeys(said))}
@@ -258,15 +235,21 @@ def make_result(
     away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
     theta = trials.theta(z_best)
     num_fitted, pull = float(np.sum(share_from_data[is_fitted])), float(np.sum(away**2))
-    status = {"converged": posterior.is_converged, **notes}
+    # Nuisances that are far from what is expected, the farthest first.
+    pulls = [
+        {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
+        for i, p in enumerate(trials.model_parameters)
+        if abs(away[i]) > PULLED_Z
+    ]
     return {
         "clips": clips,
         "method": method,
-        **status,
+        "converged": posterior.is_converged,
+        **notes,
         "effects": list(trials.all_effects),
         **table,
-        "derived": derived,
-        "pulls": _pulls(trials, theta, away),
+        "derived": _ratios(trials, posterior) | _derived_by_laws(trials, posterior) | forces,
+        "pulls": sorted(pulls, key=lambda pull: -abs(pull["z"])),
         "error": error_of(trials, theta, num_fitted, pull),
         "timings_s": timings_s,
         "version": __version__,
@@ -274,39 +257,24 @@ def make_result(
     }
 
 
-def _pulls(trials: JointProblem, theta: np.ndarray, away: np.ndarray) -> list[dict[str, Any]]:
-    """Nuisances that are far from what is expected, `away` prior sds, the farthest first."""
-    found = [
-        {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
-        for i, p in enumerate(trials.model_parameters)
-        if abs(away[i]) > PULLED_Z
-    ]
-    return sorted(found, key=lambda pull: -abs(pull["z"]))
-
-
 def _entries(
     trials: JointProblem, posterior: Posterior, spread: np.ndarray
-) -> tuple[dict[str, dict[str, dict[str, Any]]], dict[str, dict[str, Any]]]:
-    """Of the parameters and nuisances, and of what is derived from them.
-
-    Args:
-      trials: what was fitted.
-      posterior: draws in the parameters' units.
-      spread: `[parameter]`, sds of the draws in z.
-    """
-    draws = posterior.flat()
+) -> dict[str, dict[str, dict[str, Any]]]:
+    """Of parameters and nuisances; `spread`: `[parameter]`, sds of the draws in z."""
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
-    for i, parameter in enumerate(trials.parameters):
-        if parameter.role in UNSHOWN:
-            continue
-        entry: dict[str, Any] = summary_of(posterior, draws[:, i])
-        entry["unit"] = parameter.unit
-        entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
-        room = "nuisances" if parameter.role == "nuisance" else "parameters"
-        table[room][parameter.name] = entry
-    derived = {}
+    for parameter, draws, sd in zip(trials.parameters, posterior.flat().T, spread, strict=True):
+        if parameter.role not in UNSHOWN:
+            is_told = {"unit": parameter.unit, "identified": bool(sd < IDENTIFIED_SD_Z)}
+            room = "nuisances" if parameter.role == "nuisance" else "parameters"
+            table[room][parameter.name] = summary_of(posterior, draws) | is_told
+    return table
+
+
+def _ratios(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, Any]]:
+    """Entries of the masses' ratios."""
     masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
     ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
+    derived = {}
     for name, values in ratios.items():
         # Of two masses that nothing determines.
         prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
@@ -314,19 +282,18 @@ def _entries(
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
         entry = summary_of(posterior, values)
         derived[name] = {**entry, "unit": "1", "identified": is_identified}
-    return table, derived | _derived_by_laws(trials, posterior)
+    return derived
 
 
 def _untold(
     parameters: dict[str, dict[str, Any]], trials: JointProblem
-) -> tuple[tuple[str, ...], str | None]:
+) -> tuple[set[str], str | None]:
     """Parameters that others make up for, and why: a line for the user, or None."""
     has_surface = trials.problems[0].model.scene.surroundings.has_surface
     confounded, reason = confounded_with_gravity(parameters, has_surface)
     is_scaled = parameters.get("pixels_per_metre", {}).get("identified", True)
     if reason is not None or is_scaled:
-        return tuple(confounded), reason
+        return confounded, reason
     # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
-    frictions = tuple(name for name in parameters if re.fullmatch(r"k\d+", name))
-    unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
-    return (*confounded, *frictions), unscaled
+    frictions = {name for name in parameters if re.fullmatch(r"k\d+", name)}
+    return confounded | frictions, SCALE_WARNING if has_surface else FREE_SCALE_WARNING

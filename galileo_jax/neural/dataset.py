@@ -21,10 +21,8 @@ DATA_KEYS = ("preset", "seed", "engine", "frames")  # what the samples depend on
 def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
     """All samples of a config, from `folder` or made now; reports "simulating" after each shard.
 
-    Args:
-      task: makes samples.
-      config: says how many; the same config gives the same samples.
-      folder: `shard_NNNNN.npz`, and the settings that they were made with.
+    `task`: makes samples. `config`: says how many; the same config gives the same samples.
+    `folder`: `shard_NNNNN.npz`, and the settings that they were made with.
 
     Raises:
       InputError: the folder holds samples of other settings.

@@ -46,13 +46,8 @@ def measured(
 ) -> jax.Array:
     """Centres `[object, 2, frame]`, m, of bodies that are no points, but for the noise.
 
-    Args:
-      position: of points, the same shape.
-      times: `[frame]`, s.
-      bodies: see `Bodies`.
-      is_filmed: 1.0 where a camera sees them, 0.0 where none does.
-      is_tracked_here: 1.0 where our own tracker follows them.
-      normal: see `Normal`.
+    `position`: of points, the same shape. `is_filmed`: 1.0 where a camera sees them, 0.0 where none
+    does. `is_tracked_here`: 1.0 where our own tracker follows them.
     """
     x = position[:, 0]
     extra = is_filmed * _by_camera(position, normal)

@@ -32,13 +32,8 @@ def best_fit(
 ) -> GradientFit:
     """The most evident fit of a model, with the valleys beside it; the same for the same seed.
 
-    Args:
-      fitter: of the trials.
-      seed: of the starts.
-      on_stage: told what is being done.
-      effects: names of the effects that are there; default: all of the models'.
-      is_enough: of what was found, whether more starts are spared; default: whether noise explains
-        what it leaves.
+    `effects`: names of the effects that are there; default: all of the models'. `is_enough`: of
+    what was found, whether more starts are spared; default: whether noise explains what it leaves.
     """
     trials = fitter.trials
     mask = trials.free(trials.all_effects if effects is None else effects)

@@ -62,11 +62,7 @@ def fit_worlds(
     is spared where imperfections of usual sizes explain what the first one leaves. What no
     imperfection explains is fitted exactly, so that it shows where the model fails.
 
-    Args:
-      trials: without sizes.
-      seed: of the starts; the same seed gives the same result.
-      on_stage: told what is being done.
-      may_be_exact: whether an exact world is possible at all.
+    `may_be_exact`: whether an exact world is possible at all.
     """
     fitter = GradientFitter(trials)
 
@@ -112,11 +108,8 @@ def with_imperfections(
 ) -> World:
     """The trials with the sizes of imperfections that a fit asks for, and the fit with these.
 
-    Args:
-      trials: that were fitted, without sizes.
-      fit: of them, with the valleys beside it.
-      x: `[term]` each, where to begin to look for sizes, if that is known.
-      to_rest: whether the fit goes on until it stands still.
+    `fit`: of them, with the valleys beside it. `x`: `[term]` each, where to begin to look for
+    sizes, if that is known. `to_rest`: whether the fit goes on until it stands still.
     """
     terms = trials.terms
     if not terms or fit.code is Code.FAILED:

@@ -200,11 +200,7 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
 def scattered_starts(trials: JointProblem, free: np.ndarray, num: int, seed: int) -> np.ndarray:
     """A Latin hypercube over all but the nuisances, which are where they are absent.
 
-    Args:
-      trials: what is to be fitted.
-      free: `[model parameter]`, those that are not pinned.
-      num: of starts.
-      seed: the same seed gives the same starts.
+    `free`: `[model parameter]`, those that are not pinned.
 
     Returns:
       `[start, model parameter]`, z.
@@ -218,12 +214,8 @@ def scattered_round(
 ) -> np.ndarray:
     """Starts round centres in turn, of which some parameters are known and others scattered.
 
-    Args:
-      trials: what is to be fitted.
-      centres: `[centre, model parameter]`, z.
-      is_scattered: `[centre, model parameter]`, those that are not known.
-      num: of starts.
-      seed: the same seed gives the same starts.
+    `centres`: `[centre, model parameter]`, z. `is_scattered`: `[centre, model parameter]`, those
+    that are not known.
 
     Returns:
       `[start, model parameter]`, z.

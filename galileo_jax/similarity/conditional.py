@@ -26,10 +26,8 @@ def conditional_log_density(
 ) -> Float[np.ndarray, "draw object axis frame"]:
     """Log p(y_i | y_-i) of every coordinate.
 
-    Args:
-      difference_m: `[draw, object, 2, frame]`, observed minus predicted.
-      noise_scale: `[draw]`, on the tracker's errors.
-      data: the observation's covariance, decomposed.
+    `difference_m`: `[draw, object, 2, frame]`, observed minus predicted. `noise_scale`: `[draw]`,
+    on the tracker's errors.
 
     Returns:
       `[draw, object, 2, frame]`, in 1/m; -inf where masked.

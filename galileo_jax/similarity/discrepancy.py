@@ -83,11 +83,8 @@ def modes(
     After a hit the way each object goes is known to a tenth of a per cent. What only cameras
     and trackers do (keystone, roll, scale, a drift past a hit) is among them if `is_filmed`.
 
-    Args:
-      observation: the track.
-      scene: what it shows.
-      is_filmed: whether a camera took it.
-      rough_sd_m: allowed for across the path beside the wobble; 0 to draw tracks.
+    `is_filmed`: whether a camera took it. `rough_sd_m`: allowed for across the path beside the
+    wobble; 0 to draw tracks.
     """
     position = np.nan_to_num(observation.position_m)
     found = offsets(observation)

@@ -95,10 +95,8 @@ class GaussianLikelihood:
         comparisons, pictures and chi2 per degree of freedom are made of; if the model is right
         the sum of its squares is `degrees` less what the parameters take up.
 
-        Args:
-          difference_m: `[..., object, 2, frame]`, observed minus predicted.
-          noise_scale: in units of what the tracker states; 1 where residuals are shown.
-          data: the observation's covariance, decomposed.
+        `difference_m`: `[..., object, 2, frame]`, observed minus predicted. `noise_scale`: in units
+        of what the tracker states; 1 where residuals are shown.
         """
         left = noise_scale**2 / (noise_scale**2 + data.gain**2)
         return _with_modes_times(left, difference_m, noise_scale, data)
@@ -121,12 +119,8 @@ class GaussianLikelihood:
 
             -1/2 (|y|^2 - sum a^2) / s^2 - 1/2 sum a^2 / (s^2 + g^2) - 1/2 log |C|,    a = Q^T y
 
-        Args:
-          left2: `[...]`, |y|^2.
-          along2: `[..., mode]`, a^2.
-          noise_scale: `[...]`, s.
-          gain: `[..., mode]`, g.
-          count: how many numbers were measured.
+        `left2`: `[...]`, |y|^2. `along2`: `[..., mode]`, a^2. `noise_scale`: `[...]`, s. `gain`:
+        `[..., mode]`, g.
         """
         xp, variance = along2.__array_namespace__(), noise_scale**2
         of_mode = variance[..., None]

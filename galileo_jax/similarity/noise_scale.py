@@ -59,22 +59,15 @@ def fitted_mode_size(
 ) -> float:
     """The most probable common size of the modes' amplitudes over their sd, from 0 to 1.
 
-    Args:
-      white: residuals, whitened at `noise_scale`.
-      noise_scale: of the tracking errors.
-      data: the observation's covariance, decomposed.
-      errors: what of the modes' covariance is there in full, along them; None where nothing is.
+    `white`: residuals, whitened at `noise_scale`. `noise_scale`: of the tracking errors. `errors`:
+    what of the modes' covariance is there in full, along them; None where nothing is.
     """
-    noise2, gain2 = noise_scale**2, data.gain**2
-    if errors is not None:
-        amplitude = (data.basis.reshape(len(gain2), -1) @ white) * np.sqrt(noise2 + gain2)
-        covers = (mode_covariance(noise_scale, size, data, errors) for size in MODE_SIZES)
-        found = [_log_normal(amplitude, cover) for cover in covers]
-        return float(MODE_SIZES[np.argmax(found)])
-    amplitude2 = (data.basis.reshape(len(gain2), -1) @ white) ** 2 * (noise2 + gain2)
-    variance = noise2 + MODE_SIZES[:, None] ** 2 * gain2
-    log_likelihood = -0.5 * np.sum(np.log(variance) + amplitude2 / variance, axis=1)
-    return float(MODE_SIZES[np.argmax(log_likelihood)])
+    gain2 = data.gain**2
+    errors = np.zeros((len(gain2), len(gain2))) if errors is None else errors
+    white = data.basis.reshape(len(gain2), -1) @ white
+    amplitude = white * np.sqrt(noise_scale**2 + gain2)
+    covers = (mode_covariance(noise_scale, size, data, errors) for size in MODE_SIZES)
+    return float(MODE_SIZES[np.argmax([_log_normal(amplitude, cover) for cover in covers])])
 
 
 def mode_covariance(
@@ -99,11 +92,8 @@ def errors_at(
 ) -> Float[np.ndarray, "point value"]:
     """`GaussianLikelihood.tracking_errors` at another noise scale, from whitened residuals.
 
-    Args:
-      white: residuals, whitened at `noise_scale`.
-      noise_scale: what they were whitened at.
-      other_scale: at which the tracking errors are wanted.
-      data: the observation's covariance, decomposed.
+    `white`: residuals, whitened at `noise_scale`. `noise_scale`: what they were whitened at.
+    `other_scale`: at which the tracking errors are wanted.
     """
     basis, gain2 = data.basis.reshape(len(data.gain), -1), data.gain**2
     before, after = noise_scale[:, None], other_scale[:, None]

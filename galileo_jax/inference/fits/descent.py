@@ -186,11 +186,8 @@ class Descent:
 
         A proposal in three is refused, and its slopes would be most of the work.
 
-        Args:
-          there: the proposals.
-          own: where they set off.
-          widths: `[point, model parameter]`, of all points; those of `active` are changed.
-          active: `[proposal]`, which points they are of.
+        `there`: the proposals. `own`: where they set off. `widths`: `[point, model parameter]`, of
+        all points; those of `active` are changed. `active`: `[proposal]`, which points they are of.
         """
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)

@@ -174,9 +174,7 @@ class GradientFitter:
     def continued(self, fit: GradientFit, to_rest: bool = True) -> GradientFit:
         """A fit of other sizes of imperfections, gone on from, with the valleys beside it.
 
-        Args:
-          fit: with the sizes of before.
-          to_rest: whether it goes on until it stands still.
+        `fit`: with the sizes of before. `to_rest`: whether it goes on until it stands still.
         """
         points = points_of((fit, *fit.beside))
         ends = list(self._polish(points, np.zeros(len(points.z), int))[0].values())

@@ -95,10 +95,7 @@ def points_of(fits: Sequence[GradientFit]) -> Batch:
 def laplace_fits(trials: JointProblem, residuals: Residuals, found: Polished) -> list[GradientFit]:
     """The normal approximations round modes.
 
-    Args:
-      trials: what was fitted.
-      residuals: of the trials.
-      found: the modes.
+    `found`: the modes.
     """
     slopes = residuals.slopes(found.points, found.widths, is_central=True)
     normal = quadratic(slopes, found.points.z).normal

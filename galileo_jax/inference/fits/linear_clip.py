@@ -159,11 +159,8 @@ def most_probable(
 ) -> list[Mode]:
     """The most probable sizes first, and others to which starts lead.
 
-    Args:
-      clips: as of `linear_clips`.
-      terms: that have a size, in the order of x.
-      starts: `[term]` each; None: the medians and one term after the other.
-      fit: its noise scales are where these begin.
+    `terms`: that have a size, in the order of x. `starts`: `[term]` each; None: the medians and one
+    term after the other. `fit`: its noise scales are where these begin.
     """
     if starts is None:
         aside = ASIDE * (2 * np.eye(len(terms)) - 1)
@@ -181,10 +178,7 @@ def most_probable(
 def expected_lead(clips: Sequence[LinearClip], modes: Sequence[Mode], fit: GradientFit) -> float:
     """Log evidence with sizes over that without, nats, by Laplace's method: round all modes.
 
-    Args:
-      clips: as of `linear_clips`.
-      modes: as of `most_probable`.
-      fit: its noise scales are where that of none begins.
+    `modes`: as of `most_probable`. `fit`: its noise scales are where that of none begins.
     """
     none = _climbed([_without_parameters(clip) for clip in clips], (), fit.z[len(fit.steps) :])
     own = [mode.value - 0.5 * np.linalg.slogdet(mode.information)[1] for mode in modes]
@@ -248,10 +242,7 @@ def _look(
 def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequence[Mode]) -> Sizes:
     """Sizes with draws of their posterior, and the evidence with all of them integrated.
 
-    Args:
-      clips: as of `linear_clips`.
-      terms: of the sizes.
-      modes: the most probable first.
+    `modes`: the most probable first.
     """
     marginal = [_without_parameters(clip) for clip in clips]
     best, count = modes[0], len(terms)

@@ -98,10 +98,7 @@ class Ridge:
 def ridge_along(fit: GradientFit, valley: Valley, residuals: Residuals) -> Ridge | None:
     """The ridge through a fit; None where the map follows it, or it is lost to either side.
 
-    Args:
-      fit: the mode.
-      valley: round it.
-      residuals: of the trials that were fitted.
+    `valley`: round it.
     """
     bends = np.abs(valley.quadratic).max(axis=0)
     if bends.max() <= BENT:

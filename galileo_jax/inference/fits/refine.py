@@ -95,10 +95,7 @@ def noise_scales(
 ) -> Float[np.ndarray, "point clip"]:
     """The noise scales that residuals ask for, `[point, clip]`.
 
-    Args:
-      residuals: of the trials.
-      points: where.
-      used: `[point]`, how many numbers' worth of the data the parameters take up.
+    `used`: `[point]`, how many numbers' worth of the data the parameters take up.
     """
     num_values = sum(float(clip.whitening.num_values) for clip in residuals.clips)
     scales = np.empty_like(points.noise)

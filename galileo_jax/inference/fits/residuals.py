@@ -107,11 +107,8 @@ class Residuals:
     ) -> Slopes:
         """By differences, where the motion changes; in parameters of clock and camera by JAX.
 
-        Args:
-          points: where.
-          steps: `[point, model parameter]`, in z.
-          is_central: differences to both sides, not forward ones.
-          motions: of the points, where they are known.
+        `steps`: `[point, model parameter]`, in z. `is_central`: differences to both sides, not
+        forward ones. `motions`: of the points, where they are known.
         """
         index, sides = _free_index(points.free), (1, -1) if is_central else (1,)
         jacobians, whites = [], []

@@ -102,9 +102,7 @@ class Valley:
 def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     """The coordinates round a fit: their bends take two rollouts per parameter.
 
-    Args:
-      fit: the mode, with slopes at `fit.steps`.
-      residuals: of the trials that were fitted.
+    `fit`: the mode, with slopes at `fit.steps`.
     """
     count, own = len(fit.steps), np.flatnonzero(fit.free[: len(fit.steps)])
     size, directions = len(own), len(fit.z) - count + len(own)

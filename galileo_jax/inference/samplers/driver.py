@@ -111,11 +111,11 @@ def sample(
 
     Arguments:
       key: the only source of randomness; the same key gives the same draws.
-      sampler: tuned in the warm-up where it is an `TunedSampler`.
+      sampler: tuned in the warm-up where it is a `TunedSampler`.
       log_density: `[dim] -> []`, vmapped over the chains (one call per turn for all).
-      start: `[chain, dim]`; see `dispersed_starts`.
+      start: `[chain, dim]`, wider than the density, so that R-hat sees chains that have not met.
       names: of the `dim` coordinates.
-      settings: how long; immutable, so the default is safe.
+      settings: how long.
       monitor: draws `[chain, draw, dim]` to the quantities `[chain, draw]` that must
         converge: the identified ones. Default: every coordinate.
       on_block: called after each block.
@@ -128,10 +128,26 @@ def sample(
       ValueError: shapes do not fit, or the log density is not finite at a start.
       InputError: the checkpoint belongs to another run, or is damaged.
     """
-    start = jnp.asarray(start)
-    _check_shapes(sampler, start, names, settings)
+    start, per_turn = jnp.asarray(start), sampler.steps_per_turn
+    if start.ndim != 2 or start.shape[1] != len(names):
+        raise ValueError(f"start {start.shape} is not [chain, {len(names)}]")
+    if settings.block_steps % per_turn:
+        raise ValueError(
+            f"block_steps is {settings.block_steps}; {sampler.name} "
+            f"makes {per_turn} steps at a time"
+        )
     monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
-    identity = _fingerprint(key, sampler, start, names, settings, identity)
+    identity = checkpoints.fingerprint(
+        [
+            np.asarray(jax.random.key_data(key)),
+            *(np.asarray(leaf) for leaf in jax.tree.leaves(sampler)),
+            np.asarray(start),
+            sampler.name,
+            tuple(names),
+            (settings.warmup_steps, settings.block_steps),
+            identity,
+        ]
+    )
     states, sampler, history = _begun(sampler, log_density, start, checkpoint, identity)
     warmup, total = settings.warmup_steps, settings.warmup_steps + settings.max_steps
     state = dict[str, Convergence]()
@@ -158,41 +174,6 @@ def sample(
     return _posterior(key, sampler, history, names, settings, state)
 
 
-def _check_shapes(
-    sampler: AbstractSampler, start: jax.Array, names: Sequence[str], settings: Settings
-) -> None:
-    """Raises ValueError where they do not fit."""
-    if start.ndim != 2 or start.shape[1] != len(names):
-        raise ValueError(f"start {start.shape} is not [chain, {len(names)}]")
-    if settings.block_steps % sampler.steps_per_turn:
-        raise ValueError(
-            f"block_steps is {settings.block_steps}; {sampler.name} makes "
-            f"{sampler.steps_per_turn} steps at a time"
-        )
-
-
-def _fingerprint(
-    key: jax.Array,
-    sampler: AbstractSampler,
-    start: jax.Array,
-    names: Sequence[str],
-    settings: Settings,
-    identity: str,
-) -> str:
-    """What a checkpoint must be of, to be gone on from; arguments as of `sample`."""
-    return checkpoints.fingerprint(
-        [
-            np.asarray(jax.random.key_data(key)),
-            *(np.asarray(leaf) for leaf in jax.tree.leaves(sampler)),
-            np.asarray(start),
-            sampler.name,
-            tuple(names),
-            (settings.warmup_steps, settings.block_steps),
-            identity,
-        ]
-    )
-
-
 def _begun(
     sampler: AbstractSampler,
     log_density: LogDensity,
@@ -202,9 +183,7 @@ def _begun(
 ) -> tuple[Any, AbstractSampler, History]:
     """The chains' states, the sampler and the draws so far: of a checkpoint that is there, or none.
 
-    Raises:
-      ValueError: the log density is not finite at a start.
-      InputError: the checkpoint belongs to another run, or is damaged.
+    Raises as `sample`.
     """
     shapes = eqx.filter_eval_shape(_states_at, jnp.sum, sampler, start)  # without an evaluation
     if checkpoint is not None and Path(checkpoint).exists():

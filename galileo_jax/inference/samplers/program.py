@@ -33,11 +33,8 @@ class Program(eqx.Module):
 def compiled(function: Callable[..., Any], like: Any, log_density: Any, *args: Any) -> Any:
     """`function(log_density, *args)`, compiled; kept between processes for a `Program`.
 
-    Args:
-      function: of a module, so that it has a name.
-      like: PyTree of the structure of what it returns.
-      log_density: a `LogDensity`.
-      *args: PyTrees of arrays.
+    `function`: of a module, so that it has a name. `like`: PyTree of the structure of what it
+    returns. `log_density`: a `LogDensity`. `args`: PyTrees of arrays.
     """
     if not isinstance(log_density, Program):
         return _jitted(function, log_density, *args)

@@ -43,11 +43,8 @@ def predict_rest(
 ) -> Ahead:
     """Fits the start of each toss to the first `share` of it, and compares the rest.
 
-    Args:
-      tosses: their poses.
-      common: what all share, in the space of the search (`Solution.common`).
-      edge_m: as declared.
-      share: of the frames, that are seen.
+    `common`: what all share, in the space of the search (`Solution.common`). `edge_m`: as declared.
+    `share`: of the frames, that are seen.
     """
     kept = with_flights(tosses, edge_m)
     poses = [one for one, _ in kept]

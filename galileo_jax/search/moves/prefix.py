@@ -114,9 +114,7 @@ def _until(problem: Problem, end: int) -> Problem:
 def before_moving(trials: JointProblem, index: int) -> JointProblem | None:
     """The trials as they were seen before an object moves; None where one of them hardly was.
 
-    Args:
-      trials: of any number of clips.
-      index: of the object, along the travel.
+    `index`: of the object, along the travel.
     """
     short = [_before_moving(problem, index) for problem in trials.problems]
     found = [problem for problem in short if problem is not None]
