@@ -108,21 +108,13 @@ class Rolled(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A clip's data, and its covariances C_k = s^2 D + L B^T V_k^T g_k^2 V_k B L^T, by sizes k.
+    """A clip's data, and its covariances C_k = s^2 D + L B^T V_k^T g_k^2 V_k B L^T, by sizes k."""
 
-    Attributes:
-      clip: as of a fit.
-      last_record: the model's last, where rollouts end.
-      basis: B `[mode, value]`, orthonormal rows, in the stated errors.
-      turned: V_k `[size, mode, mode]`, orthonormal rows, or 0.
-      gain: g_k `[size, mode]`.
-    """
-
-    clip: ClipArrays
-    last_record: Any
-    basis: Any
-    turned: Any
-    gain: Any
+    clip: ClipArrays  # as of a fit
+    last_record: Any  # the model's last, where rollouts end
+    basis: Any  # B `[mode, value]`, orthonormal rows, in the stated errors
+    turned: Any  # V_k `[size, mode, mode]`, orthonormal rows, or 0
+    gain: Any  # g_k `[size, mode]`
 
 
 def density_of(

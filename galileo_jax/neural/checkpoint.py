@@ -21,22 +21,14 @@ CHECKPOINT, NETWORK = "checkpoint.npz", "network.npz"
 
 
 class Progress(NamedTuple):
-    """Where training stands.
+    """Where training stands."""
 
-    Attributes:
-      epoch: epochs done.
-      learning_rate: of the next.
-      best: lowest validation loss; stale: epochs since.
-      cuts: of the learning rate, so far.
-      losses: `(training, validation)` of every epoch.
-    """
-
-    epoch: int
-    learning_rate: float
-    best: float
+    epoch: int  # epochs done
+    learning_rate: float  # of the next
+    best: float  # lowest validation loss; stale: epochs since
     stale: int
-    cuts: int
-    losses: tuple[tuple[float, float], ...]
+    cuts: int  # of the learning rate, so far
+    losses: tuple[tuple[float, float], ...]  # `(training, validation)` of every epoch
 
 
 class State(NamedTuple):

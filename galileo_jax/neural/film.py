@@ -21,19 +21,12 @@ Normal = Callable[..., jax.Array]
 
 
 class Bodies(NamedTuple):
-    """What of a scene decides how bodies that are no points differ from points.
+    """What of a scene decides how bodies that are no points differ from points."""
 
-    Attributes:
-      angle_rad: of the ramp.
-      half_length_m: `[object]`.
-      foot_m: how far past the foot an object lies on the table alone.
-      mass_kg: `[object]`.
-    """
-
-    angle_rad: jax.Array
-    half_length_m: jax.Array
-    foot_m: jax.Array
-    mass_kg: jax.Array
+    angle_rad: jax.Array  # of the ramp
+    half_length_m: jax.Array  # `[object]`
+    foot_m: jax.Array  # how far past the foot an object lies on the table alone
+    mass_kg: jax.Array  # `[object]`
 
 
 def measured(

@@ -19,13 +19,9 @@ else:
 
 @runtime_checkable
 class Trainable(Protocol):
-    """Data, network and loss: what the training loop needs.
+    """Data, network and loss: what the training loop needs."""
 
-    Attributes:
-      shard_size: samples made at a time, and kept in one file.
-    """
-
-    shard_size: int
+    shard_size: int  # samples made at a time, and kept in one file
 
     def network(self, seed: int, data: Arrays | None = None) -> Any:
         """A new network; `data`: the training samples that it is to know the spread of."""

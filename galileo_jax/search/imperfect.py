@@ -35,19 +35,12 @@ class World:
 
 @dataclass(frozen=True)
 class Worlds:
-    """What clips may show, the more probable first.
+    """What clips may show, the more probable first."""
 
-    Attributes:
-      best: the more probable.
-      exact: the fit in an exact world, whatever the data say of it.
-      other: the less probable; None where it has no part in the posterior.
-      share: the probability of the less probable.
-    """
-
-    best: World
-    exact: GradientFit
-    other: World | None = None
-    share: float = 0.0
+    best: World  # the more probable
+    exact: GradientFit  # the fit in an exact world, whatever the data say of it
+    other: World | None = None  # the less probable; None where it has no part in the posterior
+    share: float = 0.0  # the probability of the less probable
 
 
 def fit_worlds(

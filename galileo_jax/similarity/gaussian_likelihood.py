@@ -35,20 +35,13 @@ class Whitening(NamedTuple):
 
     With D = L L^T and L^-1 U = Q diag(gain) V^T,
     C^-1/2 r = (y - Q (1 - s / sqrt(s^2 + gain^2)) Q^T y) / s,   y = L^-1 r.
-
-    Attributes:
-      observed_m: `[object, 2, frame]`, 0 where masked.
-      inverse_root: `[object, 2, 2, frame]`, L^-1; 0 where masked (`inverse_root_of`).
-      basis: `[mode, object, 2, frame]`, orthonormal.
-      gain: `[mode]`.
-      num_values: how many numbers were measured.
     """
 
-    observed_m: Float[np.ndarray, "object axis frame"]
-    inverse_root: Float[np.ndarray, "object 2 2 frame"]
-    basis: Float[np.ndarray, "mode object axis frame"]
-    gain: Float[np.ndarray, " mode"]
-    num_values: np.float64
+    observed_m: Float[np.ndarray, "object axis frame"]  # 0 where masked
+    inverse_root: Float[np.ndarray, "object 2 2 frame"]  # L^-1, see `inverse_root_of`
+    basis: Float[np.ndarray, "mode object axis frame"]  # orthonormal
+    gain: Float[np.ndarray, " mode"]  # `[mode]`
+    num_values: np.float64  # how many numbers were measured
 
 
 class GaussianLikelihood:

@@ -36,21 +36,13 @@ MOST_VALLEYS = 4  # that are polished
 
 
 class GiveUp(NamedTuple):
-    """Which points are not worth following.
+    """Which points are not worth following."""
 
-    Attributes:
-      owner: `[point]`, whose each is; those of one owner are rivals.
-      behind: nats behind the best rival, if the next step promises little of it.
-      price: `[point]`, what belongs to the cost beside chi2 / 2 and the prior's part.
-      behind_all: the same behind the best point of all owners.
-      lowest: total that somebody beside these points has come to.
-    """
-
-    owner: np.ndarray
-    behind: float
-    price: Any = 0.0
-    behind_all: float = np.inf
-    lowest: float = np.inf
+    owner: np.ndarray  # `[point]`, whose each is; those of one owner are rivals
+    behind: float  # nats behind the best rival, if the next step promises little of it
+    price: Any = 0.0  # `[point]`, what belongs to the cost beside chi2 / 2 and the prior's part
+    behind_all: float = np.inf  # the same behind the best point of all owners
+    lowest: float = np.inf  # total that somebody beside these points has come to
 
     def __call__(self, cost: np.ndarray, promised: np.ndarray) -> np.ndarray:
         """Which, `[point]`, by their costs and what the next steps promise, `[point]`, nats."""

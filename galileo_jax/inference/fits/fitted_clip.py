@@ -15,17 +15,11 @@ from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 @dataclass(frozen=True)
 class FittedClip:
-    """One clip of the trials, ready for compiled code.
+    """One clip of the trials, ready for compiled code."""
 
-    Attributes:
-      problem: of the clip.
-      host: all that its programs need, padded.
-      on_device: the same.
-    """
-
-    problem: Problem
-    host: ClipArrays
-    on_device: OnDevice[ClipArrays]
+    problem: Problem  # of the clip
+    host: ClipArrays  # all that its programs need, padded
+    on_device: OnDevice[ClipArrays]  # the same
 
     @classmethod
     def of(cls, trials: JointProblem, index: int) -> "FittedClip":

@@ -33,39 +33,23 @@ class Kind(NamedTuple):
 
 
 class Quadratic(NamedTuple):
-    """A cost and its Gauss-Newton approximation, of each of several points.
+    """A cost and its Gauss-Newton approximation, of each of several points."""
 
-    Attributes:
-      z: `[point, model parameter]`.
-      cost: `[point]`, nats.
-      gradient: `[point, model parameter]`.
-      normal: `[point, model parameter, model parameter]`, J^T J + 1.
-    """
-
-    z: Any
-    cost: Any
-    gradient: Any
-    normal: Any
+    z: Any  # `[point, model parameter]`
+    cost: Any  # `[point]`, nats
+    gradient: Any  # `[point, model parameter]`
+    normal: Any  # `[point, model parameter, model parameter]`, J^T J + 1
 
 
 class ClipArrays(NamedTuple):
-    """What compiled code needs of a clip, in shapes that many clips share.
+    """What compiled code needs of a clip, in shapes that many clips share."""
 
-    Attributes:
-      times_s: `[frame]`.
-      whitening: with masked frames and idle modes added.
-      scene: what it shows.
-      priors: of its parameters.
-      absent: `[own parameter]`, values in their units where pinned.
-      column: `[own parameter]`, where these stand among those of all clips.
-    """
-
-    times_s: np.ndarray
-    whitening: Whitening
-    scene: Surroundings
-    priors: PriorTable
-    absent: np.ndarray
-    column: np.ndarray
+    times_s: np.ndarray  # `[frame]`
+    whitening: Whitening  # with masked frames and idle modes added
+    scene: Surroundings  # what it shows
+    priors: PriorTable  # of its parameters
+    absent: np.ndarray  # `[own parameter]`, values in their units where pinned
+    column: np.ndarray  # `[own parameter]`, where these stand among those of all clips
 
 
 def left_of(kind: Kind, theta, position, velocity, clip: ClipArrays):

@@ -82,19 +82,12 @@ class LinearClip:
 
 
 class Mode(NamedTuple):
-    """Sizes round which others are less probable.
+    """Sizes round which others are less probable."""
 
-    Attributes:
-      both: `[term and clip]`, log sizes and log noise scales.
-      value: their log posterior.
-      information: `[term and clip, term and clip]`, average, the prior included.
-      count: of terms.
-    """
-
-    both: np.ndarray
-    value: float
-    information: np.ndarray
-    count: int
+    both: np.ndarray  # `[term and clip]`, log sizes and log noise scales
+    value: float  # their log posterior
+    information: np.ndarray  # `[term and clip, term and clip]`, average, the prior included
+    count: int  # of terms
 
     @property
     def x(self) -> np.ndarray:

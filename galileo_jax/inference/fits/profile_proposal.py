@@ -43,25 +43,15 @@ Look = Callable[[np.ndarray], Quadratic]
 
 @dataclass(frozen=True)
 class Ridge:
-    """The proposal, in straight coordinates u with `z = mode + R u` (`Valley.root`).
+    """The proposal, in straight coordinates u with `z = mode + R u` (`Valley.root`)."""
 
-    Attributes:
-      valley: whose mode and R these are.
-      direction: the column of R that the way goes along.
-      knots: `[knot]`, a, ascending.
-      best: of a, the others, `[point, other]`.
-      root: `[knot, other, other]`, the symmetric root of the others' precision.
-      edges: `[cell + 1]`, of a.
-      log_share: `[cell]`, of q(a), in a cell.
-    """
-
-    valley: Valley
-    direction: int
-    knots: Float[np.ndarray, " knot"]
-    best: Callable[[np.ndarray], np.ndarray]
-    root: Float[np.ndarray, "knot other other"]
-    edges: Float[np.ndarray, " edge"]
-    log_share: Float[np.ndarray, " cell"]
+    valley: Valley  # whose mode and R these are
+    direction: int  # the column of R that the way goes along
+    knots: Float[np.ndarray, " knot"]  # a, ascending
+    best: Callable[[np.ndarray], np.ndarray]  # of a, the others, `[point, other]`
+    root: Float[np.ndarray, "knot other other"]  # the symmetric root of the others' precision
+    edges: Float[np.ndarray, " edge"]  # of a
+    log_share: Float[np.ndarray, " cell"]  # of q(a), in a cell
 
     def draw(self, generator: np.random.Generator, num: int) -> tuple[Points, Values]:
         """See `Proposal`."""

@@ -23,17 +23,11 @@ FREE = 4  # numbers of free parameters are rounded up to multiples
 
 
 class Batch(NamedTuple):
-    """Points of several hypotheses.
+    """Points of several hypotheses."""
 
-    Attributes:
-      z: `[point, model parameter]`, 0 where pinned.
-      free: `[point, model parameter]`.
-      noise: `[point, clip]`, noise scales.
-    """
-
-    z: Float[np.ndarray, "point parameter"]
-    free: Bool[np.ndarray, "point parameter"]
-    noise: Float[np.ndarray, "point clip"]
+    z: Float[np.ndarray, "point parameter"]  # 0 where pinned
+    free: Bool[np.ndarray, "point parameter"]  # `[point, model parameter]`
+    noise: Float[np.ndarray, "point clip"]  # noise scales
 
     def take(self, index: Any) -> "Batch":
         """The points of an index array."""

@@ -45,21 +45,13 @@ LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some be
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Valley:
-    """The map from `w`, in which the posterior is about N(0, 1), to `z`; as a proposal, a t in w.
+    """The map from `w`, in which the posterior is about N(0, 1), to `z`; a proposal, a t in w."""
 
-    Attributes:
-      mode: `[parameter]`, z at w = 0.
-      root: `[parameter, direction]`, R; pinned parameters have no direction.
-      axes: `[direction, direction]`, V: w in terms of u.
-      quadratic: `[direction, direction]`, B.
-      cubic: `[direction, direction]`, C.
-    """
-
-    mode: Any
-    root: Any
-    axes: Any
-    quadratic: Any
-    cubic: Any
+    mode: Any  # `[parameter]`, z at w = 0
+    root: Any  # `[parameter, direction]`, R; pinned parameters have no direction
+    axes: Any  # `[direction, direction]`, V: w in terms of u
+    quadratic: Any  # `[direction, direction]`, B
+    cubic: Any  # `[direction, direction]`, C
 
     def __call__(self, w: Any) -> Any:
         """From w to z, `[..., parameter]`; in NumPy or JAX, whichever w is of."""

@@ -46,23 +46,14 @@ _slopes = jax.jit(jax.vmap(jax.jacfwd(left_over, argnums=(0, 1)), (None, 0, 0, 0
 
 @dataclass(frozen=True)
 class TossSolution:
-    """What the tosses say.
+    """What the tosses say."""
 
-    Attributes:
-      mean: `[common]`, in the order of `COMMON`, in their units.
-      covariance: `[common, common]`, likewise.
-      solution: in the space of the search.
-      names: of the tosses that were used.
-      rms: `[toss]`, of whitened residuals within the window.
-      start: first guesses, `[toss, ...]`.
-    """
-
-    mean: np.ndarray
-    covariance: np.ndarray
-    solution: Solution
-    names: tuple[str, ...]
-    rms: np.ndarray
-    start: Start
+    mean: np.ndarray  # `[common]`, in the order of `COMMON`, in their units
+    covariance: np.ndarray  # `[common, common]`, likewise
+    solution: Solution  # in the space of the search
+    names: tuple[str, ...]  # of the tosses that were used
+    rms: np.ndarray  # `[toss]`, of whitened residuals within the window
+    start: Start  # first guesses, `[toss, ...]`
 
 
 def fit_poses(

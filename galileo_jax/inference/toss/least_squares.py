@@ -31,23 +31,14 @@ Slopes = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the search ended.
+    """Where the search ended."""
 
-    Attributes:
-      common: `[common]`, what all share.
-      own: `[toss, 12]`.
-      covariance: `[common, common]`, of the common ones, over tosses.
-      residuals: `[toss, frame, 6]`, whitened; 0 where nothing counts.
-      loss: what was made small.
-      has_converged: whether the last step gained next to nothing.
-    """
-
-    common: np.ndarray
-    own: np.ndarray
-    covariance: np.ndarray
-    residuals: np.ndarray
-    loss: float
-    has_converged: bool
+    common: np.ndarray  # `[common]`, what all share
+    own: np.ndarray  # `[toss, 12]`
+    covariance: np.ndarray  # `[common, common]`, of the common ones, over tosses
+    residuals: np.ndarray  # `[toss, frame, 6]`, whitened; 0 where nothing counts
+    loss: float  # what was made small
+    has_converged: bool  # whether the last step gained next to nothing
 
 
 def solve(

@@ -25,17 +25,11 @@ _left = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
 
 @dataclass(frozen=True)
 class Ahead:
-    """How far the predicted rest of each toss is from the measured one; means over its frames.
+    """How far the predicted rest of each toss is from the measured one; means over its frames."""
 
-    Attributes:
-      names: of the tosses.
-      place: `[toss]`, distance of the centres over the edge.
-      turn_rad: `[toss]`, angle of the turning between predicted and measured.
-    """
-
-    names: tuple[str, ...]
-    place: np.ndarray
-    turn_rad: np.ndarray
+    names: tuple[str, ...]  # of the tosses
+    place: np.ndarray  # `[toss]`, distance of the centres over the edge
+    turn_rad: np.ndarray  # `[toss]`, angle of the turning between predicted and measured
 
 
 def predict_rest(
