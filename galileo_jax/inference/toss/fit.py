@@ -40,7 +40,7 @@ PRIOR_SD = np.array([1.0, 1.0, 0.03, FLOOR_SD_M, 0.05, 0.7, 0.3, *3 * [CENTRE_SD
 REST_SD_M = 2e-4  # of the height at rest, where it is seen: poses are placed to a tenth of it
 FRAMES = 16  # the length of a window is rounded up to multiples, so that fits share programs
 
-_left = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
+left_of_all = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
 _slopes = jax.jit(jax.vmap(jax.jacfwd(left_over, argnums=(0, 1)), (None, 0, 0, 0)))
 
 
@@ -151,7 +151,7 @@ def solve_window(
     scale = np.repeat([1 / PLACE_SD_M, 1 / TURN_SD_RAD], 3) * is_in[..., None]
 
     def residuals(z: np.ndarray, changes: np.ndarray) -> np.ndarray:
-        left = np.asarray(_left(jnp.asarray(z), jnp.asarray(changes), start, seen))
+        left = np.asarray(left_of_all(jnp.asarray(z), jnp.asarray(changes), start, seen))
         return np.where(is_in[..., None], left * scale, 0.0)
 
     def slopes(z: np.ndarray, changes: np.ndarray) -> tuple[Any, Any]:
@@ -182,8 +182,3 @@ def padded(tosses: Sequence[Poses], length: int) -> Seen:
 def starts_of(flights: Sequence[Flight]) -> Start:
     """First guesses, `[toss, ...]`."""
     return Start(*(jnp.asarray([getattr(f, name) for f in flights]) for name in Start._fields))
-
-
-def index_of(name: str) -> int:
-    """Where a common parameter stands."""
-    return COMMON.index(name)

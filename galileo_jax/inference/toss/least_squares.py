@@ -49,21 +49,14 @@ def solve(
     prior_sd: np.ndarray,
     own_sd: np.ndarray,
     middle: np.ndarray,
-    max_steps: int = MAX_STEPS,
 ) -> Solution:
-    """Searches from `common` and `own`.
+    """Searches from `common` `[common]` and `own` `[toss, 12]`.
 
-    Args:
-      residuals: whitened, `[toss, frame, 6]`.
-      slopes: of these with respect to common and own: `[toss, frame, 6, ...]`.
-      common: `[common]`.
-      own: `[toss, 12]`.
-      prior_sd: `[common]`, standard deviations of the prior.
-      own_sd: `[12]`, likewise; about 0.
-      middle: `[common]`, of the prior.
-      max_steps: so many at most.
+    `residuals`: whitened, `[toss, frame, 6]`. `slopes`: of these with respect to common and own,
+    `[toss, frame, 6, ...]`. The priors are normal: `middle` and `prior_sd` of what is common, 0 and
+    `own_sd` of what is not.
     """
-    damped = 1e-2
+    damped, has_converged = 1e-2, False
 
     def loss_of(left: np.ndarray, common: np.ndarray, own: np.ndarray) -> float:
         square = np.where(np.isfinite(left), left, 1e3) ** 2
@@ -71,13 +64,16 @@ def solve(
         prior = np.sum(((common - middle) / prior_sd) ** 2)
         return float(robust + 0.5 * prior + 0.5 * np.sum((own / own_sd) ** 2))
 
+    def arrow_at(left: np.ndarray, common: np.ndarray, own: np.ndarray) -> "_Arrow":
+        pull, own_pull = (common - middle) / prior_sd**2, own / own_sd**2
+        return _Arrow(left, *slopes(common, own), pull, own_pull, prior_sd**-2.0, own_sd**-2.0)
+
     left = residuals(common, own)
-    loss, has_converged = loss_of(left, common, own), False
-    for step in range(max_steps):
+    loss = loss_of(left, common, own)
+    for step in range(MAX_STEPS):
         check_cancelled()
-        progress.report("fitting", step / max_steps)
-        arrow = _Arrow(left, *slopes(common, own), (common - middle) / prior_sd**2)
-        arrow.add_prior(prior_sd, own_sd, own / own_sd**2)
+        progress.report("fitting", step / MAX_STEPS)
+        arrow = arrow_at(left, common, own)
         while True:
             moved, moved_own = arrow.step(damped)
             new, new_own = common + moved, own + moved_own
@@ -86,24 +82,28 @@ def solve(
             if there < loss or damped > MOST_DAMPED:
                 break
             damped *= 4.0
-        if there >= loss:
-            has_converged = True
-            break
         gain, damped = loss - there, max(damped / 6.0, 1e-9)
-        common, own, left, loss = new, new_own, left_there, there
-        if gain < SMALLEST_GAIN * max(loss, 1.0):
-            has_converged = True
+        has_converged = gain < SMALLEST_GAIN * max(min(there, loss), 1.0)
+        if gain > 0:
+            common, own, left, loss = new, new_own, left_there, there
+        if has_converged:
             break
-    arrow = _Arrow(left, *slopes(common, own), (common - middle) / prior_sd**2)
-    arrow.add_prior(prior_sd, own_sd, own / own_sd**2)
-    return Solution(common, own, arrow.sandwich(), left, loss, has_converged)
+    sandwich = arrow_at(left, common, own).sandwich()
+    return Solution(common, own, sandwich, left, loss, has_converged)
 
 
 class _Arrow:
-    """The normal equations of all tosses at one point."""
+    """The normal equations of all tosses at one point, of residuals, slopes, priors' pulls."""
 
     def __init__(
-        self, left: np.ndarray, by_common: np.ndarray, by_own: np.ndarray, pull: np.ndarray
+        self,
+        left: np.ndarray,
+        by_common: np.ndarray,
+        by_own: np.ndarray,
+        pull: np.ndarray,
+        own_pull: np.ndarray,
+        prior: np.ndarray,
+        own_prior: np.ndarray,
     ):
         count = len(left)
         left = np.where(np.isfinite(left), left, 0.0)
@@ -116,20 +116,14 @@ class _Arrow:
         )
         self.aa = np.einsum("nri,nr,nrj->nij", a, weight, a)
         self.ab = np.einsum("nri,nr,nrj->nij", a, weight, b)
-        self.bb = np.einsum("nri,nr,nrj->nij", b, weight, b)
+        self.bb = np.einsum("nri,nr,nrj->nij", b, weight, b) + np.diag(own_prior)
         self.ga = -np.einsum("nri,nr,nr->ni", a, weight, r)
-        self.gb = -np.einsum("nri,nr,nr->ni", b, weight, r)
-        self.pull, self.prior = pull, np.zeros(a.shape[-1])
-
-    def add_prior(self, prior_sd: np.ndarray, own_sd: np.ndarray, own_pull: np.ndarray) -> None:
-        """Adds the normal priors."""
-        self.prior = prior_sd**-2.0
-        self.bb = self.bb + np.diag(own_sd**-2.0)
-        self.gb = self.gb - own_pull
+        self.gb = -np.einsum("nri,nr,nr->ni", b, weight, r) - own_pull
+        self.pull, self.prior = pull, prior
 
     def step(self, damped: float) -> tuple[np.ndarray, np.ndarray]:
         """The damped step of what all share `[common]` and of the starts `[toss, 12]`."""
-        own = self.bb + damped * _diagonals(self.bb)
+        own = self.bb + damped * np.eye(self.bb.shape[-1]) * self.bb
         solved = np.linalg.solve(own, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
         whole = self.aa.sum(axis=0) + np.diag(self.prior)
         matrix = whole + damped * np.diag(np.diag(whole))
@@ -148,7 +142,3 @@ class _Arrow:
         meat = scores.T @ scores * count / max(count - 1, 1)
         meat = meat + np.diag(self.prior)
         return bread @ meat @ bread
-
-
-def _diagonals(matrices: np.ndarray) -> np.ndarray:
-    return np.eye(matrices.shape[-1]) * matrices

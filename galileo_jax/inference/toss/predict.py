@@ -3,24 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.toss.fit import (
     PRIOR_SD,
-    index_of,
+    left_of_all,
     padded,
     solve_window,
     starts_of,
     with_flights,
 )
-from galileo_jax.inference.toss.residuals import forward, left_over
+from galileo_jax.inference.toss.residuals import EDGE, forward
 from galileo_jax.observation.poses import Poses
 
 KNOWN = 1e-4  # of the prior's widths: what other tosses told stays
-
-_left = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
 
 
 @dataclass(frozen=True)
@@ -51,8 +48,8 @@ def predict_rest(
     for stage in (np.minimum(flown, until), until):
         found = solve_window(seen, start, list(stage), common, own, common, KNOWN * PRIOR_SD)
         own = found.own
-    left = np.asarray(_left(jnp.asarray(common), jnp.asarray(own), start, seen))
-    edge = float(forward(jnp.asarray(common))[index_of("edge")])
+    left = np.asarray(left_of_all(jnp.asarray(common), jnp.asarray(own), start, seen))
+    edge = float(forward(jnp.asarray(common))[EDGE])
     place, turn = [], []
     for one, begin, end in zip(left, until, lengths, strict=True):
         place.append(np.linalg.norm(one[begin:end, :3], axis=1).mean() / edge)
