@@ -37,12 +37,19 @@ def score_tests(
     Returns:
       `[candidate]`, of the last effect of each, without a refit; signed strengths by size.
     """
-    probes = np.tile(trials.theta(base.z, base.free), (len(candidates), 1))
-    for probe, effects in zip(probes, candidates, strict=True):
-        where, size = strength_of(trials, effects[-1])
+    here = trials.theta(base.z, base.free)
+    strengths = [strength_of(trials, effects[-1]) for effects in candidates]
+    probes = np.tile(here, (len(candidates), 1))
+    for probe, (where, size) in zip(probes, strengths, strict=True):
         probe[where] = size
     residual, change = _changes(trials, base, probes)
-    return np.sqrt(_explained_by(trials, base, probes, candidates, residual, change))
+    # As it is, for effects that only act above some strength; and so small that it is a slope.
+    share = np.minimum(SMALL_CHANGE / np.maximum(np.linalg.norm(change, axis=1), SHOWS), 1.0)
+    smaller = probes.copy()
+    for row, own, (where, _) in zip(smaller, share, strengths, strict=True):
+        row[where] = here[where] + own * (row[where] - here[where])
+    both = np.concatenate([change, _changes(trials, base, smaller)[1]])
+    return np.sqrt(explained(*_along(base, residual, both)).reshape(2, -1).max(axis=0))
 
 
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
@@ -77,30 +84,6 @@ def slopes_along(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The slopes to each of `probes` along the base fit's residuals, and their squares."""
     return _along(base, *_changes(trials, base, probes))
-
-
-def _explained_by(
-    trials: JointProblem,
-    base: GradientFit,
-    probes: np.ndarray,
-    candidates: Sequence[tuple[str, ...]],
-    residual: np.ndarray,
-    change: np.ndarray,
-) -> np.ndarray:
-    """How much of the squared residuals the slope to each candidate's probe explains.
-
-    The better of the probe as it is, for effects that only act above some strength, and of one so
-    small that the change of the track, `SMALL_CHANGE`, is a slope. The last two arguments are what
-    `_changes` finds of the probes.
-    """
-    here = trials.theta(base.z, base.free)
-    share = np.minimum(SMALL_CHANGE / np.maximum(np.linalg.norm(change, axis=1), SHOWS), 1.0)
-    smaller = probes.copy()
-    for row, own, effects in zip(smaller, share, candidates, strict=True):
-        where, _ = strength_of(trials, effects[-1])
-        row[where] = here[where] + own * (row[where] - here[where])
-    both = np.concatenate([change, _changes(trials, base, smaller)[1]])
-    return explained(*_along(base, residual, both)).reshape(2, -1).max(axis=0)
 
 
 def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
