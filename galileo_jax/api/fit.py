@@ -23,11 +23,15 @@ from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
-from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
+from galileo_jax.inference.fit_posterior import (
+    fit_posterior,
+    laplace_posterior,
+    two_solutions,
+    uncertain_width,
+)
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities

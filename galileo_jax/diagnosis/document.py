@@ -16,10 +16,9 @@ from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.friction_along_way import SHOWN, Stretch
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
-from galileo_jax.inference.fit_posterior import fit_posterior
+from galileo_jax.inference.fit_posterior import fit_posterior, laplace_posterior
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.inference.result import (
     IDENTIFIED_SD_Z,

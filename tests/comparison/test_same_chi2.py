@@ -7,8 +7,8 @@ import pytest
 
 from galileo_jax.comparison import compare as module
 from galileo_jax.comparison.compare import compare
+from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from tests.comparison.test_calibration import disturbed, fit_near_truth
 from tests.oracle_trials import make_trials

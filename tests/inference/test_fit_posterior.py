@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference import fit_posterior as module
-from galileo_jax.inference.fit_posterior import fit_posterior, to_go_on_from, uncertain_width
+from galileo_jax.inference.fit_posterior import (
+    NUM_DRAWS,
+    fit_posterior,
+    laplace_posterior,
+    to_go_on_from,
+    uncertain_width,
+)
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.laplace import Code
-from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Status
 from galileo_jax.search.fit import best_fit
 from tests.inference.test_importance_sampling import BENT, TWO, Known, points

@@ -12,9 +12,9 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.confounded import confounded_with_gravity
+from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects import make_effects

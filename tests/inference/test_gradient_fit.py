@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.fits import gradient
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.rollout.engines import make_engine

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from galileo_jax.inference.fit_posterior import laplace_posterior, two_solutions
 from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
-from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.model.parameters import Normal, Parameter
 
 TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 4)))[0]

@@ -15,10 +15,9 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import arviz
-from galileo_jax.inference.fit_posterior import fit_posterior
+from galileo_jax.inference.fit_posterior import fit_posterior, laplace_posterior
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation

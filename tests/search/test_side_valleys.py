@@ -10,10 +10,10 @@ import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.fits.descent import ends_of, in_valley, valleys
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Status
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.search.fit import best_fit, looked_round

@@ -2,7 +2,7 @@
 
     search   Levenberg-Marquardt (`descent.py`) on  [ C^-1/2 (observed - predicted(z)) ; z ],  the
              prior being the second block, at more noise than the clip's
-    polish   the same with fitted noise scales, until a new round gains nothing (`refine.py`)
+    polish   the same with fitted noise scales, until a new round gains nothing (`descent.py`)
     fit      the normal approximation in z, with covariance (J^T J + 1)^-1; evidence by Laplace
              (`laplace.py`)
 
@@ -21,18 +21,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from galileo_jax.inference.fits.descent import BEHIND as BEHIND
 from galileo_jax.inference.fits.descent import (
     BEHIND_IN_SEARCH,
     SAME_VALLEY_NATS,
     Descended,
     Descent,
     GiveUp,
+    polish,
 )
 from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
 from galileo_jax.inference.fits.laplace import laplace_fits, points_of
-from galileo_jax.inference.fits.refine import BEHIND as BEHIND
-from galileo_jax.inference.fits.refine import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import (
     NOISE_SCALE_RANGE,
