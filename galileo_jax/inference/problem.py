@@ -68,22 +68,17 @@ class Problem:
         between records. A parameter of another effect is called by its place: the programs are the
         same whichever effects made the motion.
         """
-        model = self.model
-        scene, every = model.scene.surroundings, model.effects + model.nuisances
-        own = [type(effect) for effect in every]
-        is_seen = [e.time is not Effect.time or e.measure is not Effect.measure for e in own]
-        used, other = (
-            {
-                p.name
-                for e, seen in zip(every, is_seen, strict=True)
-                if seen is wanted
-                for p in e.parameters(scene)
-            }
-            for wanted in (True, False)
-        )
-        names = (f"_{i}" if n in other - used else n for i, n in enumerate(model.names))
-        effects = tuple(e for e, seen in zip(every, is_seen, strict=True) if seen)
-        return effects, tuple(names), model.record_dt_s
+        model, scene = self.model, self.model.scene.surroundings
+        named: dict[bool, set[str]] = {True: set(), False: set()}
+        effects = []
+        for effect in model.effects + model.nuisances:
+            own = type(effect)
+            is_seen = own.time is not Effect.time or own.measure is not Effect.measure
+            effects += [effect] * is_seen
+            named[is_seen] |= {p.name for p in effect.parameters(scene)}
+        others = named[False] - named[True]
+        names = (f"_{i}" if name in others else name for i, name in enumerate(model.names))
+        return tuple(effects), tuple(names), model.record_dt_s
 
     @cached_property
     def data(self) -> Whitening:

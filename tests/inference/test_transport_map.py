@@ -120,9 +120,8 @@ def test_draws_of_another_shape_get_coordinates_of_their_own():
     """Where the fit's widths are a third of the true ones, its bends are wrong, too."""
     valley, generator = any_valley(), np.random.default_rng(6)
     valley = replace(valley, quadratic=0.3 * valley.quadratic, cubic=0.1 * valley.cubic)
-    unbent = replace(valley, quadratic=0 * valley.quadratic, cubic=0 * valley.cubic)
     z = valley.mode + 3.0 * generator.standard_normal((2000, DIM)) @ valley.root.T
-    bent = np.array([u_of(valley, one) for one in unbent.straight(z)])
+    bent = valley.inverse(z)
     np.testing.assert_allclose(valley(bent), z, atol=1e-6)
     found, mean, covariance = learned(valley, bent)
     assert not found.quadratic.any()
@@ -130,14 +129,6 @@ def test_draws_of_another_shape_get_coordinates_of_their_own():
     own = found.straight(z)
     np.testing.assert_allclose(own.mean(axis=0), mean, atol=1e-9)
     np.testing.assert_allclose(np.cov(own, rowvar=False), covariance, atol=1e-9)
-
-
-def u_of(valley, straight):
-    """The inverse of the bends: each direction is bent by those before it alone."""
-    u, unbent = np.zeros(DIM), straight @ valley.axes
-    for i in range(DIM):
-        u[i] = unbent[i] - valley.quadratic[i] @ u**2 - valley.cubic[i] @ u**3
-    return valley.axes @ u
 
 
 @pytest.mark.slow
