@@ -119,7 +119,7 @@ def _errors(
     0 where nothing was measured.
     """
     data, errors = problem.data, problem.errors_in_full
-    gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
+    gain2, basis = data.gain**2, data.rows
     found = generator.standard_normal((count, problem.observation.position_m.size))
     if problem.observation.noise_known_to:
         found = found * _uneven(problem.observation, label, count, generator)

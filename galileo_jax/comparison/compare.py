@@ -7,7 +7,7 @@ calibrated without assuming that the rollout is linear or the tests independent,
 for having looked in many places (Westfall and Young 1993; arXiv 2412.15100). Beyond what the
 replicates reach, a Gumbel distribution fitted to them is used.
 
-Residuals are the tracking errors that the fit leaves (`GaussianLikelihood.tracking_errors`), at
+Residuals are the tracking errors that the fit leaves (`Whitening.tracking_errors`), at
 the noise scale that they ask for themselves, of the data as of every replicate; so p is uniform
 under the model, whether the imperfections that the likelihood allows for are there or not.
 
@@ -30,7 +30,7 @@ from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, Joi
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.result import PULLED_Z, error_of
 from galileo_jax.model.parameters import prior_deviations
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening, is_measured
+from galileo_jax.similarity.gaussian_likelihood import Whitening, is_measured
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
 
 NUM_REPLICATES = 200
@@ -204,7 +204,7 @@ def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarra
     found = list[Cell]()
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
         seen = problem.observation
-        absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
+        absorbed = problem.data.absorbed(scales[clip])
         every = find_cells(
             clip, seen.names, is_measured(problem.data.inverse_root), label, seen.axes
         )

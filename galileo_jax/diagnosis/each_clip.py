@@ -25,7 +25,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import velocity_error
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 
 NUM_PARTS = 4  # quarters, as they are called
 ALIKE_P = 0.01
@@ -94,7 +94,7 @@ def _one(trials: JointProblem, fit: GradientFit, comparison: Comparison, clip: i
     scale = float(np.clip(alone.noise_scale(theta, 0), *JUDGED_SCALE_RANGE))
 
     def degrees(scale: float) -> float:
-        return max(float(GaussianLikelihood.degrees(scale, problem.data)) - found.num_used, 1.0)
+        return max(float(problem.data.degrees(scale)) - found.num_used, 1.0)
 
     left = float(np.sum(problem.tracking_errors(predicted, scale) ** 2))
     stated = float(np.sum(problem.tracking_errors(predicted) ** 2))
@@ -136,9 +136,9 @@ def _parts(
     moved = np.zeros((len(shapes), *predicted.shape))
     moved[:, 0, :, seen[0] : seen[-1] + 1] = shapes
     scene = problem.model.scene.surroundings
-    data = GaussianLikelihood.prepare(problem.observation, scene, "tracker")
-    left = GaussianLikelihood.whiten_batch(data.observed_m - predicted, 1.0, data)
-    design = GaussianLikelihood.whiten_batch(moved, 1.0, data)
+    data = whitening_in(problem.observation, scene, "tracker")
+    left = data.whiten_batch(data.observed_m - predicted, 1.0)
+    design = data.whiten_batch(moved, 1.0)
     inverse = np.linalg.pinv(design @ design.T)
     found = inverse @ (design @ left)
     left = np.asarray(left - found @ design).reshape(predicted.shape)[0][:, seen]

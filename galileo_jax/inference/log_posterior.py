@@ -31,7 +31,7 @@ from galileo_jax.model.effects.effect import Effect
 from galileo_jax.rollout.engine_jax import RECORDS
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.batching import FRAMES, rounded_up
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import Whitening, log_density_by_modes
 
 # Of the draws of sizes: more of few measured values, whose squared number is what each costs.
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
@@ -91,8 +91,8 @@ def _log_likelihood(
 ) -> Float[np.ndarray, " point"]:
     """Of what was measured, up to the constant of the tracker's own covariance."""
     with np.errstate(over="ignore", invalid="ignore"):
-        along2 = (left @ data.basis.reshape(len(data.gain), -1).T) ** 2
-        return GaussianLikelihood.log_density_by_modes(
+        along2 = (left @ data.rows.T) ** 2
+        return log_density_by_modes(
             np.sum(left**2, axis=1), along2, noise, data.gain, data.num_values
         )
 
@@ -188,7 +188,7 @@ def _of_clip(how: Rolled, part: Part, z: jax.Array, noise: jax.Array) -> jax.Arr
     position, velocity = jnp.where(is_over, end, position), jnp.where(is_over, 0.0, velocity)
     left = left_of(kind, theta, position, velocity, clip)
     along2 = jnp.einsum("kmn,n->km", part.turned, part.basis @ left) ** 2
-    found = GaussianLikelihood.log_density_by_modes(
+    found = log_density_by_modes(
         jnp.sum(left**2), along2, noise, part.gain, clip.whitening.num_values
     )
     return jnp.where(jnp.any(jnp.abs(left) >= FAILED), -jnp.inf, found)
@@ -202,7 +202,7 @@ def _covariances(clip: FittedClip, draws: list[Sizes]) -> tuple[np.ndarray, np.n
     turned, gain = np.zeros((len(draws), count, count)), np.zeros((len(draws), count))
     for k, sizes in enumerate(draws):
         data = clip.problem.with_sizes(sizes).data
-        patterns = data.gain[:, None] * data.basis.reshape(len(data.gain), -1)
+        patterns = data.gain[:, None] * data.rows
         _, own, vectors = np.linalg.svd(patterns @ basis.T, full_matrices=False)
         turned[k, : len(own), : len(basis)], gain[k, : len(own)] = vectors, own
     frames = clip.whitening.observed_m.shape[-1] - whole.basis.shape[-1]

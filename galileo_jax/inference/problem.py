@@ -23,7 +23,6 @@ from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.discrepancy import across_path
 from galileo_jax.similarity.gaussian_likelihood import (
-    GaussianLikelihood,
     NoiseModel,
     Whitening,
     fixed_patterns,
@@ -44,7 +43,7 @@ class Problem:
       model: scene and effects.
       engine: rolls the model out.
       name: of the clip.
-      noise: see `GaussianLikelihood.prepare`.
+      noise: see `whitening_in`.
       sizes: of imperfections by name, `statespace.sizes.Sizes.x`; None: there are none.
     """
 
@@ -230,7 +229,7 @@ class Problem:
           `[..., object * 2 * frame]`.
         """
         difference = self.data.observed_m - predicted_m
-        return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
+        return self.data.whiten_batch(difference, noise_scale)
 
     def followed(self, predicted_m: np.ndarray, is_usual: bool = True) -> np.ndarray:
         """Where bodies were, if they deviate from a prediction as bodies usually do.
@@ -268,10 +267,10 @@ class Problem:
     def tracking_errors(self, predicted_m: np.ndarray, noise_scale: float = 1.0) -> np.ndarray:
         """The tracking errors that a prediction leaves, in units of their sd.
 
-        Args and returns as `whiten`; see `GaussianLikelihood.tracking_errors`.
+        Args and returns as `whiten`; see `Whitening.tracking_errors`.
         """
         difference = self.data.observed_m - predicted_m
-        return GaussianLikelihood.tracking_errors(difference, noise_scale, self.data)
+        return self.data.tracking_errors(difference, noise_scale)
 
 
 def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:

@@ -26,7 +26,6 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.summarise import summary_of
 from galileo_jax.model.effects.effect import true_surroundings
 from galileo_jax.model.parameters import inverse, prior_deviations
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # In z every prior is a standard normal: above this less than half comes from the data.
 IDENTIFIED_SD_Z = 0.5
@@ -134,7 +133,7 @@ def error_of(
     for clip, problem in enumerate(trials.problems):
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(problem.tracking_errors(predicted) ** 2))
-        count += float(GaussianLikelihood.degrees(1.0, problem.data))
+        count += float(problem.data.degrees(1.0))
         predictions.append(problem.followed(predicted, is_usual))
     error = velocity_error(trials.problems, predictions)
     error |= distance_error(trials.problems, predictions)

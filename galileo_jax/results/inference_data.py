@@ -34,7 +34,6 @@ from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.resampled import resampled
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,7 +198,9 @@ def _drawn_again(
     return theta[which], float(pareto_k)
 
 
-_log_densities = jax.jit(jax.vmap(GaussianLikelihood.log_density, (0, 0, None)))
+_log_densities = jax.jit(
+    jax.vmap(lambda seen, scale, data: data.log_density(seen, scale), (0, 0, None))
+)
 
 
 def _positions(trials: JointProblem, theta: np.ndarray, clip: int) -> np.ndarray:

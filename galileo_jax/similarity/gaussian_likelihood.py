@@ -43,107 +43,95 @@ class Whitening(NamedTuple):
     gain: Float[np.ndarray, " mode"]  # `[mode]`
     num_values: np.float64  # how many numbers were measured
 
+    @property
+    def rows(self) -> Any:
+        """The basis as `[mode, value]`."""
+        return self.basis.reshape(len(self.gain), -1)
 
-class GaussianLikelihood:
-    """A normalised log-likelihood of positions; see the module."""
-
-    @staticmethod
-    def prepare(
-        observation: Observation,
-        scene: Surroundings,
-        noise: NoiseModel = "camera",
-    ) -> Whitening:
-        """Decomposes the covariance of an observation in a scene.
-
-        Args:
-          observation: the data, with the tracker's own errors.
-          scene: what it shows.
-          noise: "camera": the tracker's errors and all of `discrepancy`; "bodies": without
-            the camera's part of it; "tracker": the tracker's errors alone, to see what the
-            rest is good for.
-        """
-        inverse_root = inverse_root_of(observation)
-        patterns = white_patterns(fixed_patterns(observation, scene, noise), inverse_root)
-        return whitening_of(observation, inverse_root, patterns)
-
-    @staticmethod
-    def whiten(difference_m: Places, noise_scale: Scale, data: Whitening) -> Places:
+    def whiten(self, difference_m: Places, noise_scale: Scale) -> Places:
         """C^-1/2 r for `difference_m` `[object, 2, frame]`; unit normal if the model is right."""
-        y = jnp.einsum("oijt,ojt->oit", data.inverse_root, difference_m)
-        amplitude = jnp.einsum("moit,oit->m", data.basis, y)
-        shrink = 1 - noise_scale / jnp.sqrt(noise_scale**2 + data.gain**2)
-        return (y - jnp.einsum("moit,m->oit", data.basis, shrink * amplitude)) / noise_scale
+        y = jnp.einsum("oijt,ojt->oit", self.inverse_root, difference_m)
+        amplitude = jnp.einsum("moit,oit->m", self.basis, y)
+        shrink = 1 - noise_scale / jnp.sqrt(noise_scale**2 + self.gain**2)
+        return (y - jnp.einsum("moit,m->oit", self.basis, shrink * amplitude)) / noise_scale
 
-    @staticmethod
-    def whiten_batch(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
+    def whiten_batch(self, difference_m: Batch, noise_scale: float) -> Values:
         """`whiten` of `[..., object, 2, frame]` in NumPy, nothing to compile: `[..., value]`."""
-        left = noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
-        return _with_modes_times(left, difference_m, noise_scale, data)
+        left = noise_scale / np.sqrt(noise_scale**2 + self.gain**2)
+        return self._with_modes_times(left, difference_m, noise_scale)
 
-    @staticmethod
-    def tracking_errors(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
+    def tracking_errors(self, difference_m: Batch, noise_scale: float) -> Values:
         """The tracking errors in a difference, in units of their sd: `[..., value]`.
 
         s L^T C^-1 r: what the modes take up is left out, and nothing else. The one residual that
         comparisons, pictures and chi2 per degree of freedom are made of; if the model is right
-        the sum of its squares is `degrees` less what the parameters take up.
-
-        `difference_m`: `[..., object, 2, frame]`, observed minus predicted. `noise_scale`: in units
-        of what the tracker states; 1 where residuals are shown.
+        the sum of its squares is `degrees` less what the parameters take up. `noise_scale`: in
+        units of what the tracker states; 1 where residuals are shown.
         """
-        left = noise_scale**2 / (noise_scale**2 + data.gain**2)
-        return _with_modes_times(left, difference_m, noise_scale, data)
+        left = noise_scale**2 / (noise_scale**2 + self.gain**2)
+        return self._with_modes_times(left, difference_m, noise_scale)
 
-    @staticmethod
-    def log_density(
-        predicted_m: Places, noise_scale: Scale, data: Whitening
-    ) -> Float[jax.Array, ""]:
+    def _with_modes_times(
+        self, left: np.ndarray, difference_m: Batch, noise_scale: float
+    ) -> Values:
+        """L^-1 r / s with the modes' parts times `left` `[mode]`."""
+        # What a wild proposal makes of a motion may be infinite: it has no density, and is refused.
+        with np.errstate(over="ignore", invalid="ignore"):
+            y = np.einsum("oijt,...ojt->...oit", self.inverse_root, difference_m)
+            y = y.reshape(*difference_m.shape[:-3], -1)
+            return (y - ((y @ self.rows.T) * (1 - left)) @ self.rows) / noise_scale
+
+    def log_density(self, predicted_m: Places, noise_scale: Scale) -> Float[jax.Array, ""]:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
-        difference = jnp.asarray(data.observed_m) - predicted_m
-        white = GaussianLikelihood.whiten(difference, noise_scale, data)
-        log_determinant = GaussianLikelihood.log_determinant(noise_scale, data)
-        return -0.5 * (jnp.sum(white**2) + log_determinant)
+        white = self.whiten(jnp.asarray(self.observed_m) - predicted_m, noise_scale)
+        return -0.5 * (jnp.sum(white**2) + self.log_determinant(noise_scale))
 
-    @staticmethod
-    def log_density_by_modes(
-        left2: Any, along2: Any, noise_scale: Any, gain: Any, count: Any
-    ) -> Any:
-        """The same of residuals y in the stated errors, from their squares: NumPy's or JAX's.
-
-            -1/2 (|y|^2 - sum a^2) / s^2 - 1/2 sum a^2 / (s^2 + g^2) - 1/2 log |C|,    a = Q^T y
-
-        `left2`: `[...]`, |y|^2. `along2`: `[..., mode]`, a^2. `noise_scale`: `[...]`, s. `gain`:
-        `[..., mode]`, g.
-        """
-        xp, variance = along2.__array_namespace__(), noise_scale**2
-        of_mode = variance[..., None]
-        square = (left2 - along2.sum(-1)) / variance + (along2 / (of_mode + gain**2)).sum(-1)
-        volume = count * xp.log(variance) + xp.log1p(gain**2 / of_mode).sum(-1)
-        return -0.5 * (square + volume)
-
-    @staticmethod
-    def degrees(noise_scale: Any, data: Whitening) -> Any:
+    def degrees(self, noise_scale: Any) -> Any:
         """How many numbers tell of the tracker's noise: the measured less those the modes take."""
-        return data.num_values - (data.gain**2 / (noise_scale**2 + data.gain**2)).sum()
+        return self.num_values - (self.gain**2 / (noise_scale**2 + self.gain**2)).sum()
 
-    @staticmethod
-    def absorbed(noise_scale: float, data: Whitening) -> Float[np.ndarray, " value"]:
+    def absorbed(self, noise_scale: float) -> Float[np.ndarray, " value"]:
         """The share, 0 to 1, of each value's tracking error that the modes take up."""
-        share = data.gain**2 / (noise_scale**2 + data.gain**2)
-        return share @ data.basis.reshape(len(share), -1) ** 2
+        return (self.gain**2 / (noise_scale**2 + self.gain**2)) @ self.rows**2
 
-    @staticmethod
-    def information(noise_scale: Any, data: Whitening) -> Any:
+    def information(self, noise_scale: Any) -> Any:
         """Fisher's, of the noise scale's logarithm."""
-        share = noise_scale**2 / (noise_scale**2 + data.gain**2)
-        return 2 * (data.num_values - len(data.gain) + (share**2).sum())
+        share = noise_scale**2 / (noise_scale**2 + self.gain**2)
+        return 2 * (self.num_values - len(self.gain) + (share**2).sum())
 
-    @staticmethod
-    def log_determinant(noise_scale: Any, data: Whitening) -> Any:
+    def log_determinant(self, noise_scale: Any) -> Any:
         """Of the covariance, up to the constant of the tracker's own; NumPy's of NumPy's arrays."""
-        gain = data.gain / noise_scale
+        gain = self.gain / noise_scale
         xp = gain.__array_namespace__()
-        return data.num_values * xp.log(noise_scale**2) + xp.sum(xp.log1p(gain**2))
+        return self.num_values * xp.log(noise_scale**2) + xp.sum(xp.log1p(gain**2))
+
+
+def whitening_in(
+    observation: Observation, scene: Surroundings, noise: NoiseModel = "camera"
+) -> Whitening:
+    """The covariance of an observation in a scene, decomposed.
+
+    `noise`: "camera": the tracker's errors and all of `discrepancy`; "bodies": without the camera's
+    part of it; "tracker": the tracker's errors alone, to see what the rest is good for.
+    """
+    inverse_root = inverse_root_of(observation)
+    patterns = white_patterns(fixed_patterns(observation, scene, noise), inverse_root)
+    return whitening_of(observation, inverse_root, patterns)
+
+
+def log_density_by_modes(left2: Any, along2: Any, noise_scale: Any, gain: Any, count: Any) -> Any:
+    """`Whitening.log_density` of residuals y in the stated errors, from squares: NumPy's or JAX's.
+
+        -1/2 (|y|^2 - sum a^2) / s^2 - 1/2 sum a^2 / (s^2 + g^2) - 1/2 log |C|,    a = Q^T y
+
+    `left2`: `[...]`, |y|^2. `along2`: `[..., mode]`, a^2. `noise_scale`: `[...]`, s. `gain`: `[...,
+    mode]`, g. `count`: how many numbers were measured.
+    """
+    xp, variance = along2.__array_namespace__(), noise_scale**2
+    of_mode = variance[..., None]
+    square = (left2 - along2.sum(-1)) / variance + (along2 / (of_mode + gain**2)).sum(-1)
+    volume = count * xp.log(variance) + xp.log1p(gain**2 / of_mode).sum(-1)
+    return -0.5 * (square + volume)
 
 
 def inverse_root_of(observation: Observation) -> Float[np.ndarray, "object axis axis frame"]:
@@ -234,15 +222,3 @@ def principal_modes(
         return np.sqrt(np.maximum(variance[::-1], 0.0)), basis.T[::-1]
     _, gain, basis = np.linalg.svd(patterns, full_matrices=False)
     return gain, basis
-
-
-def _with_modes_times(
-    left: np.ndarray, difference_m: Batch, noise_scale: float, data: Whitening
-) -> Values:
-    """L^-1 r / s with the modes' parts times `left` `[mode]`."""
-    basis = data.basis.reshape(len(data.gain), -1)
-    # What a wild proposal makes of a motion may be infinite: it has no density, and is refused.
-    with np.errstate(over="ignore", invalid="ignore"):
-        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
-        y = y.reshape(*difference_m.shape[:-3], -1)
-        return (y - ((y @ basis.T) * (1 - left)) @ basis) / noise_scale

@@ -36,7 +36,7 @@ def fitted_noise_scale(
       data: the observation's covariance, decomposed.
     """
     variance, gain2 = noise_scale[:, None] ** 2, data.gain**2
-    modes = (white @ data.basis.reshape(len(gain2), -1).T) ** 2
+    modes = (white @ data.rows.T) ** 2
     rest = np.maximum(np.sum(white**2, axis=1) - np.sum(modes, axis=1), 0.0) * variance[:, 0]
     amplitude2 = modes * (variance + gain2)
     low, high = (np.full(len(white), end) for end in LOG_VARIANCES)
@@ -64,7 +64,7 @@ def fitted_mode_size(
     """
     gain2 = data.gain**2
     errors = np.zeros((len(gain2), len(gain2))) if errors is None else errors
-    white = data.basis.reshape(len(gain2), -1) @ white
+    white = data.rows @ white
     amplitude = white * np.sqrt(noise_scale**2 + gain2)
     covers = (mode_covariance(noise_scale, size, data, errors) for size in MODE_SIZES)
     return float(MODE_SIZES[np.argmax([_log_normal(amplitude, cover) for cover in covers])])
@@ -90,12 +90,12 @@ def errors_at(
     other_scale: Float[np.ndarray, " point"],
     data: Whitening,
 ) -> Float[np.ndarray, "point value"]:
-    """`GaussianLikelihood.tracking_errors` at another noise scale, from whitened residuals.
+    """`Whitening.tracking_errors` at another noise scale, from whitened residuals.
 
     `white`: residuals, whitened at `noise_scale`. `noise_scale`: what they were whitened at.
     `other_scale`: at which the tracking errors are wanted.
     """
-    basis, gain2 = data.basis.reshape(len(data.gain), -1), data.gain**2
+    basis, gain2 = data.rows, data.gain**2
     before, after = noise_scale[:, None], other_scale[:, None]
     modes = white @ basis.T
     errors = modes * np.sqrt(before**2 + gain2) * after / (after**2 + gain2)

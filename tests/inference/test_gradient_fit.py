@@ -15,7 +15,6 @@ from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.search.fit import best_fit
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -86,7 +85,7 @@ def test_the_truth_comes_back(alone):
     assert found.code is Code.CONVERGED
     check_truth(HIT, SCATTER_HIT, trials, found)
     (problem,) = trials.problems
-    left = GaussianLikelihood.degrees(1.0, problem.data) - found.num_used
+    left = problem.data.degrees(1.0) - found.num_used
     assert 0.7 * left < found.chi2 < 1.3 * left < 0.7 * trials.num_values
     assert found.log_evidence > fit_from_truth(HIT, trials).log_evidence - 0.2
 

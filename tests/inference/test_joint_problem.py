@@ -13,7 +13,6 @@ from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.log_posterior import density_of
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import Uniform
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -99,7 +98,7 @@ def log_density_by_hand(trials, z, predicted):
     for clip, problem in enumerate(trials.problems):
         noise = np.exp(NOISE_SD * z[len(trials.model_parameters) + clip])
         assert trials.noise_scale(theta, clip) == pytest.approx(noise, rel=SAME)
-        total += float(GaussianLikelihood.log_density(predicted[clip], noise, problem.data))
+        total += float(problem.data.log_density(predicted[clip], noise))
     return total
 
 

@@ -10,7 +10,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.wander_size import IN_SPACE_S, LARGEST_M, LASTS_S, with_wander
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 from tests.ramp_model import HIT, make_surroundings
 
 SD_M = 1e-5
@@ -103,8 +103,8 @@ def test_in_space_the_likelihood_takes_what_the_track_tells(wander_m: float | No
     seen = replace(tossed(0.0, 0), wander_m=wander_m)
     box = make_surroundings(replace(HIT, object2_x_m=None))
     scene = replace(box, has_table=False, has_surface=False, moves_in_plane=True)
-    data = GaussianLikelihood.prepare(seen, scene)
+    data = whitening_in(seen, scene)
     slow = np.zeros_like(seen.position_m)
     slow[0, 1] = 0.1 * seen.times_s**2
-    chi2 = float(np.sum(GaussianLikelihood.whiten_batch(slow, 1.0, data) ** 2))
+    chi2 = float(np.sum(data.whiten_batch(slow, 1.0) ** 2))
     assert (chi2 > 100) == (wander_m is not None), chi2

@@ -8,7 +8,7 @@ import pytest
 from galileo_jax.inference.convergence import arviz
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import Whitening, whitening_in
 from tests.ramp_model import HIT, make_surroundings
 
 FRAMES = 7
@@ -28,7 +28,7 @@ def make_data(frames: int = FRAMES) -> Whitening:
     covariance[1, :, :, 2] = np.nan
     names = ("object1", "object2")
     seen = Observation(names, np.arange(frames) / 30, position, covariance, mask)
-    return GaussianLikelihood.prepare(seen, SCENE)
+    return whitening_in(seen, SCENE)
 
 
 def covariance_of(data: Whitening, noise_scale: float) -> tuple[np.ndarray, np.ndarray]:

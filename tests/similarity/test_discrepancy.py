@@ -16,7 +16,7 @@ from galileo_jax.similarity.discrepancy import (
     across_path,
     modes,
 )
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 from galileo_jax.similarity.hit_discrepancy import (
     CLOSE_M,
     HIT_END_S,
@@ -103,8 +103,8 @@ def test_ideal_tracks_have_the_noise_that_they_are_drawn_with():
     found = []
     for seed in range(12):
         seen, clean = observe(HIT, seed, 2e-4), observe(HIT, seed, 0.0)
-        data = GaussianLikelihood.prepare(seen, SCENE)
-        left = GaussianLikelihood.whiten_batch(seen.position_m - clean.position_m, 1.0, data)
+        data = whitening_in(seen, SCENE)
+        left = data.whiten_batch(seen.position_m - clean.position_m, 1.0)
         found.extend(fitted_noise_scale(left[None], np.ones(1), np.zeros(1), 1e3, data))
     assert 0.93 < np.mean(found) < 1.02
 
@@ -162,9 +162,9 @@ def cost(bend_m: np.ndarray) -> float:
         moves_in_plane=True,
         angle_rad=0.0,
     )
-    data = GaussianLikelihood.prepare(thrown(bend_m), flight)
+    data = whitening_in(thrown(bend_m), flight)
     difference = data.observed_m - thrown().position_m
-    return float(np.sum(GaussianLikelihood.whiten_batch(difference, 1.0, data) ** 2))
+    return float(np.sum(data.whiten_batch(difference, 1.0) ** 2))
 
 
 def test_a_lens_that_bends_a_flight_is_no_misfit():

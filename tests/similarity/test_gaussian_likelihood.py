@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity import discrepancy, gaussian_likelihood
 from galileo_jax.similarity.discrepancy import crossings, modes
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
 
@@ -62,9 +62,9 @@ def difference(observation):
 
 @pytest.mark.parametrize("noise_scale", [0.6, 1.0, 2.3])
 def test_whitened_residuals(observation, difference, noise_scale):
-    data = GaussianLikelihood.prepare(observation, SCENE)
-    white = np.asarray(GaussianLikelihood.whiten(jnp.asarray(difference), noise_scale, data))
-    in_numpy = GaussianLikelihood.whiten_batch(difference, noise_scale, data)
+    data = whitening_in(observation, SCENE)
+    white = np.asarray(data.whiten(jnp.asarray(difference), noise_scale))
+    in_numpy = data.whiten_batch(difference, noise_scale)
     np.testing.assert_allclose(in_numpy, white.reshape(-1), atol=SAME)
     covariance, _, measured = dense(observation, noise_scale)
     r = difference.reshape(-1)[measured]
@@ -74,7 +74,7 @@ def test_whitened_residuals(observation, difference, noise_scale):
     draws = np.zeros((400, difference.size))
     root = np.linalg.cholesky(covariance)
     draws[:, measured] = np.random.default_rng(2).normal(size=(400, len(r))) @ root.T
-    unit = jax.vmap(lambda d: GaussianLikelihood.whiten(d, noise_scale, data))(
+    unit = jax.vmap(lambda d: data.whiten(d, noise_scale))(
         jnp.asarray(draws.reshape(400, *difference.shape))
     )
     spread = np.mean(np.asarray(unit) ** 2) * difference.size / len(r)
@@ -83,9 +83,9 @@ def test_whitened_residuals(observation, difference, noise_scale):
 
 @pytest.mark.parametrize("noise_scale", [0.6, 1.0, 2.3])
 def test_log_density(observation, difference, noise_scale):
-    data = GaussianLikelihood.prepare(observation, SCENE)
+    data = whitening_in(observation, SCENE)
     predicted = jnp.asarray(data.observed_m - difference)
-    value = float(GaussianLikelihood.log_density(predicted, jnp.asarray(noise_scale), data))
+    value = float(data.log_density(predicted, jnp.asarray(noise_scale)))
     covariance, tracker, measured = dense(observation, noise_scale)
     r = difference.reshape(-1)[measured]
     exact = multivariate_normal(np.zeros(len(r)), covariance).logpdf(r)
@@ -95,7 +95,7 @@ def test_log_density(observation, difference, noise_scale):
 
 
 def test_masked_frames_count_for_nothing(observation):
-    data = GaussianLikelihood.prepare(observation, SCENE)
+    data = whitening_in(observation, SCENE)
     elsewhere = replace(
         observation,
         position_m=np.where(observation.mask[:, None], observation.position_m, 7.0),
@@ -104,11 +104,11 @@ def test_masked_frames_count_for_nothing(observation):
         ),
     )
     # Not even through the patterns, which are drawn from measured positions only.
-    assert data.num_values == GaussianLikelihood.prepare(elsewhere, SCENE).num_values
+    assert data.num_values == whitening_in(elsewhere, SCENE).num_values
     predicted = jnp.asarray(np.nan_to_num(observation.position_m) + 1e-3)
 
     def density(x):
-        return GaussianLikelihood.log_density(x, jnp.asarray(1.0), data)
+        return data.log_density(x, jnp.asarray(1.0))
 
     gradient = np.asarray(jax.grad(density)(predicted))
     hidden = np.broadcast_to(~observation.mask[:, None], gradient.shape)
@@ -131,7 +131,7 @@ def test_differences_with_their_exact_covariance(monkeypatch):
     flat[0, 0, 0] = flat[1, 0, 1] = 1e3  # metres: as good as free
     monkeypatch.setattr(gaussian_likelihood, "modes", lambda *_, is_filmed: flat)
     monkeypatch.setattr(gaussian_likelihood, "crossings", lambda *_: np.zeros((0, 1, 2, frames)))
-    data = GaussianLikelihood.prepare(observation, SCENE)
+    data = whitening_in(observation, SCENE)
 
     dt = times[1] - times[0]
     band = 2 * np.eye(frames - 1) - np.eye(frames - 1, k=1) - np.eye(frames - 1, k=-1)
@@ -143,7 +143,7 @@ def test_differences_with_their_exact_covariance(monkeypatch):
 
     def by_positions(predicted):
         one = jnp.asarray(1.0)
-        return float(GaussianLikelihood.log_density(jnp.asarray(predicted), one, data))
+        return float(data.log_density(jnp.asarray(predicted), one))
 
     others = [truth + 0.5, truth * 1.001, truth + 1e-3 * rng.normal(size=truth.shape)]
     for other in others:

@@ -7,7 +7,6 @@ import numpy as np
 import galileo_jax as gx
 from galileo_jax.observation.observation import UNMEASURED_SD_M
 from galileo_jax.similarity.gaussian_likelihood import (
-    GaussianLikelihood,
     inverse_root_of,
     is_measured,
     whitening_of,
@@ -52,8 +51,8 @@ def test_modes_take_up_no_more_than_was_measured():
     data = whitening_of(seen, root, np.einsum("oijt,mojt->moit", root, every))
     assert len(data.gain) <= data.num_values == count * frames
     for scale in (0.05, 1.0):
-        assert GaussianLikelihood.information(scale, data) >= 0
-        assert GaussianLikelihood.degrees(scale, data) >= 0
+        assert data.information(scale) >= 0
+        assert data.degrees(scale) >= 0
 
 
 def test_a_slide_of_which_one_coordinate_was_measured_is_compared_with_its_own_noise(tmp_path):

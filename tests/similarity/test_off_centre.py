@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 from galileo_jax.similarity.level_discrepancy import CENTRE_SHARE, level_modes
 from tests.ramp_model import HIT, make_surroundings
 
@@ -84,8 +84,8 @@ def test_a_point_off_the_centre_is_no_misfit() -> None:
 
     def misfit(turning: np.ndarray | None) -> float:
         there = replace(seen, turned_rad=turning)
-        data = GaussianLikelihood.prepare(there, SCENE, noise="bodies")
-        return float(np.sum(GaussianLikelihood.whiten_batch(off, 1.0, data) ** 2))
+        data = whitening_in(there, SCENE, noise="bodies")
+        return float(np.sum(data.whiten_batch(off, 1.0) ** 2))
 
     assert misfit(seen.turned_rad) < 2
     assert misfit(None) > 100

@@ -7,7 +7,7 @@ import pytest
 
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import crossings, modes
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.gaussian_likelihood import whitening_in
 from galileo_jax.similarity.rocking_discrepancy import rocking
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
@@ -72,11 +72,11 @@ def test_what_stays_up_does_not_rock():
 
 def misfit(seen: Observation) -> float:
     """chi2 per value of the whole track against the closed form."""
-    data = GaussianLikelihood.prepare(seen, SCENE, noise="bodies")
+    data = whitening_in(seen, SCENE, noise="bodies")
     difference = (
         np.where(seen.mask[:, None], seen.position_m, 0.0) - observe(TALL, 0, 0.0).position_m
     )
-    white = GaussianLikelihood.whiten_batch(difference, 1.0, data)
+    white = data.whiten_batch(difference, 1.0)
     return float(np.sum(white**2)) / seen.position_m.size
 
 

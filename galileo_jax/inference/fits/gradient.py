@@ -40,7 +40,6 @@ from galileo_jax.inference.joint_problem import (
     noise_explains,
 )
 from galileo_jax.runtime.batching import side_by_side
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 MANY = 64  # points of a usual batch
 # Noise on the way to a fit, metres: a camera that sees hundredths of a millimetre makes valleys too
@@ -168,7 +167,7 @@ class GradientFitter:
     def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
         """Whether `noise_explains` what it leaves."""
         data = [clip.whitening for clip in self.residuals.clips]
-        degrees = sum(float(GaussianLikelihood.degrees(1.0, own)) for own in data)
+        degrees = sum(float(own.degrees(1.0)) for own in data)
         return noise_explains(fit.chi2, degrees - fit.num_used, noise_scale)
 
     def continued(self, fit: GradientFit, to_rest: bool = True) -> GradientFit:

@@ -16,7 +16,7 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.runtime.trace_cache import trace_cached
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 # Damping is lowered where a step brought three quarters of what it promised: the textbook's value
 # (Nocedal and Wright, 2006, ch. 4). optimistix's own, 0.99, crawls in a curved valley.
@@ -62,7 +62,7 @@ def left_of(kind: Kind, theta, position, velocity, clip: ClipArrays):
 def white_of(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
     """Whitened residuals of one motion, `[value]`."""
     difference = _difference_m(kind, theta, position, velocity, clip)
-    white = GaussianLikelihood.whiten(difference, noise, clip.whitening).reshape(-1)
+    white = clip.whitening.whiten(difference, noise).reshape(-1)
     return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
 
 

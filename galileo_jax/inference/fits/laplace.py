@@ -13,7 +13,6 @@ from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.noise_scale import errors_at
 from galileo_jax.statespace.sizes import Sizes
 
@@ -149,7 +148,7 @@ def _covariance(
     whole = np.zeros((count + len(scale),) * 2)
     whole[np.ix_(own, own)] = inverse(normal[np.ix_(own, own)])
     for c, (clip, s) in enumerate(zip(residuals.clips, scale, strict=True)):
-        information = float(GaussianLikelihood.information(s, clip.whitening))
+        information = float(clip.whitening.information(s))
         whole[count + c, count + c] = 1 / (1 + information * NOISE_SD**2)
     return whole
 
@@ -164,5 +163,5 @@ def _log_evidence(
     """Laplace: the density at the mode times the posterior's volume over the prior's."""
     total = -float(cost(white, z)) - 0.5 * float(np.sum((np.log(scale) / NOISE_SD) ** 2))
     for clip, s in zip(residuals.clips, scale, strict=True):
-        total -= 0.5 * float(GaussianLikelihood.log_determinant(s, clip.whitening))
+        total -= 0.5 * float(clip.whitening.log_determinant(s))
     return total + 0.5 * float(np.linalg.slogdet(covariance)[1])

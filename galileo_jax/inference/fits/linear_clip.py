@@ -138,7 +138,7 @@ def averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row val
 def _in_stated_errors(white: np.ndarray, scale: float, problem: Problem) -> np.ndarray:
     """Columns of whitened residuals in units of the stated tracking errors."""
     data = problem.data
-    basis = data.basis.reshape(len(data.gain), -1)
+    basis = data.rows
     along = basis @ white
     more = np.sqrt(scale**2 + data.gain**2) - scale
     return scale * white + basis.T @ (more[:, None] * along)

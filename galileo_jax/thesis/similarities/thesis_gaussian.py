@@ -14,7 +14,7 @@ class GaussianSimilarity(AbstractSimilarity):
 
     Normalized, but of a noise that velocities from tracked positions do not have: theirs
     is correlated between neighbours, and far smaller than sqrt(0.05) = 0.22 m/s. For an
-    honest posterior use `GaussianLikelihood`. The thesis does not state the variance's
+    honest posterior use `Whitening.log_density`. The thesis does not state the variance's
     unit; we read (m/s)^2. Its own acceptance and selection only rank, so that its answer
     is the same for every variance.
     """
