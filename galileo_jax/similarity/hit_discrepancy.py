@@ -71,11 +71,16 @@ class _Hit:
 def _at_the_hit(
     frame: int, front: int, position: np.ndarray, observation: Observation
 ) -> list[np.ndarray]:
-    """What bodies that are no points do at a hit and while they are close."""
+    """What bodies that are no points do at a hit, which takes a while, and while they are close."""
     hit = _speeds_at(frame, front, position, observation)
     if hit is None:
         return []
-    return [*_soft_end(hit, position, observation), *_pushes(hit, position, observation)]
+    found = _pushes(hit, position, observation)
+    if hit.pulled_apart > 0:  # a soft hit ends late, and lacks what friction changes meanwhile
+        since = np.maximum(observation.times_s - observation.times_s[frame], 0.0)
+        lacks_m = -hit.pulled_apart * HIT_END_S * since
+        found.insert(0, _between(hit, lacks_m, position, observation))
+    return found
 
 
 def _speeds_at(
@@ -98,18 +103,6 @@ def _speeds_at(
         return None
     bend = np.polyfit(since, (ahead - rear)[both], 2)[0]
     return _Hit(frame, front, both, float(loses), float(gains), 2 * float(bend))
-
-
-def _soft_end(hit: _Hit, position: np.ndarray, observation: Observation) -> list[np.ndarray]:
-    """What the bodies' relative speed lacks because a hit did not end at once.
-
-    As much as friction changes it in `HIT_END_S`; nothing where friction presses the bodies
-    together.
-    """
-    if hit.pulled_apart <= 0:
-        return []
-    since = np.maximum(observation.times_s - observation.times_s[hit.frame], 0.0)
-    return [_between(hit, -hit.pulled_apart * HIT_END_S * since, position, observation)]
 
 
 def _pushes(hit: _Hit, position: np.ndarray, observation: Observation) -> list[np.ndarray]:

@@ -28,10 +28,7 @@ class Mixture(TunedSampler):
     draws; where it is not, the first is the random walk that always works. The tail, heavier
     than the Gaussian's, lets chains leave where p's is.
 
-    Measured when a coin drew each step's kind, in eight dimensions (Gaussian, banana, log-scale,
-    cut-off Gaussian), after the warm-up: 0.22 to 0.33 effective draws of the worst coordinate per
-    evaluation, the random walk 0.02 to 0.03. To R-hat < 1.01 with eight chains, warm-up included:
-    4,100 to 6,400 evaluations against 33,000 to 44,000. In turns: docs/explanation/samplers.md.
+    How it compares with the random walk: docs/explanation/samplers.md.
 
     Source: Tierney, Markov chains for exploring posterior distributions, Ann. Statist. 22
     (1994), sections 2.3 and 2.4, 10.1214/aos/1176325750. Proposals ahead of time: A. E. Brockwell,

@@ -20,8 +20,7 @@ from galileo_jax.inference.samplers.sampler import (
 class RandomWalk(TunedSampler):
     """Proposes x + s L xi with xi ~ N(0, I), L L^T the density's covariance.
 
-    Accepts with min(1, p(y) / p(x)). In eight dimensions it takes 30 to 45 evaluations for
-    one effective draw of the worst coordinate, even with a well-learned covariance.
+    Accepts with min(1, p(y) / p(x)).
 
     Source: Roberts, Gelman, Gilks, Weak convergence and optimal scaling of random walk
     Metropolis algorithms, Ann. Appl. Probab. 7 (1997), 10.1214/aoap/1034625254.
