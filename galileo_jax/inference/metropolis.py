@@ -110,9 +110,10 @@ def metropolis_posterior(
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     if second is not None and not posterior.is_converged:
         w = posterior.draws
-        before, (valley, *shape) = valley, learned(valley, w[:, w.shape[1] // 2 :].reshape(-1, dim))
-        begin = w[:, -1] if valley is before else valley.straight(before(w[:, -1]))
-        posterior = run(valley, begin, *shape, second, True)
+        later, last = w[:, w.shape[1] // 2 :].reshape(-1, dim), w[:, -1]
+        before, (valley, mean, covariance) = valley, learned(valley, later)
+        begin = last if valley is before else valley.straight(before(last))
+        posterior = run(valley, begin, mean, covariance, second, True)
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda w: trials.theta(valley(w)), trials.names)

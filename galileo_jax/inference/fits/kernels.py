@@ -78,7 +78,9 @@ def _difference_m(kind: Kind, theta, position, velocity, clip: ClipArrays):
 @trace_cached(num_static=1)
 def white_batch(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
     """Whitened residuals of many motions, `[point, value]`."""
-    return jax.vmap(lambda *one: white_of(kind, *one, clip))(theta, position, velocity, noise)
+    return jax.vmap(lambda t, p, v, n: white_of(kind, t, p, v, n, clip))(
+        theta, position, velocity, noise
+    )
 
 
 @trace_cached(num_static=1)
