@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.clip.checks import check_same_objects
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.same_objects import check_same_objects
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command, diagnose, fit
 from galileo_jax.inference.build_problem import make_joint_problem, make_problem

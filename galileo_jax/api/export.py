@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from galileo_jax.clip.checks import check_scale
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.same_objects import check_scale
 from galileo_jax.measurement.measure import measure
 from galileo_jax.results.export import (
     FORMATS,

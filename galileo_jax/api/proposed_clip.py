@@ -11,7 +11,7 @@ from galileo_jax.api.questions import check_answered, questions
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
-from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
@@ -110,7 +110,6 @@ def _plain(declared: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
-    from galileo_jax.clip.label import KEY_ORDER  # and OpenCV, which a table does not need
 
     scenario = known.scenario(answers)
     assert scenario is not None  # else a question is open
@@ -133,7 +132,7 @@ def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
     ]
     if scenario.has_table:  # nobody has said when object 1 is let go: its motion does
         content["objects"][0]["first_frame"] = None
-    return {key: content[key] for key in KEY_ORDER if key in content}
+    return {key: content[key] for key in ClipFile.model_fields if key in content}
 
 
 def _sure_unit(known: Understood, answers: Answers) -> str | None:

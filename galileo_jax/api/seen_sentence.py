@@ -48,8 +48,9 @@ def _of_table(seen: Seen) -> str:
     unit = "rad" if seen.axes == ("angle",) else seen.unit or "(in a unit that it does not say)"
     who = "One thing moves" if len(seen.names) == 1 else f"{len(seen.names)} things move"
     rate = "counted in pictures" if seen.is_in_frames else f"{1 / seen.step:.3g} a second"
-    looks = _looks(Likely(seen.scenario, seen.why))
-    return f"{who}, {math.hypot(*seen.moved):.3g} {unit} {looks}. {seen.num_rows} rows, {rate}."
+    return (
+        f"{who}, {math.hypot(*seen.moved):.3g} {unit} {_looks(seen)}. {seen.num_rows} rows, {rate}."
+    )
 
 
 def _looks(likely: Likely) -> str:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax.api.clips import ClipLike, as_clip, as_list
+from galileo_jax.clip.checks import check_same_objects, check_scale
 from galileo_jax.clip.load import with_corrections
-from galileo_jax.clip.same_objects import check_same_objects, check_scale
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import write_observation_csv

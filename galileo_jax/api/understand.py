@@ -108,7 +108,7 @@ class Understood:
     def likely(self, answers: Answers) -> Likely | None:
         """The likeliest kind of motion, of a film of the thing that was chosen; None: unknown."""
         if (seen := self.look.seen) is not None:
-            return Likely(seen.scenario, seen.why, seen.is_clear, seen.slope_deg, seen.swings)
+            return seen
         points = self.points(answers)
         if len(points) == 1:
             return self.path(points[0]).likely

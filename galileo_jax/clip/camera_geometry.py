@@ -14,45 +14,44 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from galileo_jax.clip.fields import Number, is_number, refused, wrong
 
 CORNERS = 4
 LONGEST_M = 100.0
 FLATTEST = 1e-3  # sine of a corner's angle below which its sides lie on one line
 MIN_K1, MAX_K1 = -0.3, 0.5  # below -1/3 the picture would fold within its own corners
-MAX_K1_SD = 0.2
+NO_K1 = (
+    f"{{v:g}} is outside [{MIN_K1:g}, {MAX_K1:g}]; how much longer the lens makes half a "
+    "diagonal of the picture, as a share of it"
+)
+MOST_PX = 1e9
 
 Pixel = tuple[float, float]
 
 
-def _wrong(message: str) -> PydanticCustomError:
-    return PydanticCustomError("clip", "{text}", {"text": message})
-
-
-def _is_number(value: Any) -> bool:
-    is_real = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_real and abs(value) < 1e9  # also no NaN
+def _is_pair(value: Any) -> bool:
+    is_list = isinstance(value, list | tuple) and len(value) == 2
+    return is_list and all(is_number(one, MOST_PX) for one in value)
 
 
 def _corners(value: Any) -> tuple[Pixel, ...]:
     if not isinstance(value, list | tuple):
-        raise _wrong("no list; four corners [x, y] in pixels expected")
+        raise wrong("no list; four corners [x, y] in pixels expected")
     if len(value) != CORNERS:
-        raise _wrong(f"{len(value)} corners; four expected, from the bottom left one on")
-    for corner in value:
-        is_pair = isinstance(corner, list | tuple) and len(corner) == 2
-        if not (is_pair and all(map(_is_number, corner))):
-            raise _wrong("a corner is not [x, y] in pixels")
+        raise wrong(f"{len(value)} corners; four expected, from the bottom left one on")
+    if not all(map(_is_pair, value)):
+        raise wrong("a corner is not [x, y] in pixels")
     corners = np.array(value, float)
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*before.T) * np.hypot(*after.T)
     # Of y that points down: counter-clockwise as seen is negative.
     sines = -(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / np.maximum(lengths, 1e-9)
     if (sines < -FLATTEST).all():
-        raise _wrong("corners go round clockwise; bottom left, bottom right, top right, top left")
+        raise wrong("corners go round clockwise; bottom left, bottom right, top right, top left")
     if not (sines > FLATTEST).all():
-        raise _wrong(
+        raise wrong(
             "sides cross, or three corners lie on a line; bottom left, bottom right, top right, "
             "top left expected"
         )
@@ -60,22 +59,12 @@ def _corners(value: Any) -> tuple[Pixel, ...]:
 
 
 def _sides(value: Any) -> tuple[float, float]:
-    is_pair = isinstance(value, list | tuple) and len(value) == 2
-    if not (is_pair and all(map(_is_number, value))):
-        raise _wrong("[width, height] in metres expected")
+    if not _is_pair(value):
+        raise wrong("[width, height] in metres expected")
     for side in value:
         if not 0 < side <= LONGEST_M:
-            raise _wrong(f"{side:g} is not the length of a side; metres above 0 expected")
+            raise wrong(f"{side:g} is not the length of a side; metres above 0 expected")
     return float(value[0]), float(value[1])
-
-
-def _k1(value: float) -> float:
-    if not MIN_K1 <= value <= MAX_K1:
-        raise _wrong(
-            f"{value:g} is outside [{MIN_K1:g}, {MAX_K1:g}]; how much longer the lens makes half a "
-            "diagonal of the picture, as a share of it"
-        )
-    return value
 
 
 class Rectangle(BaseModel):
@@ -103,8 +92,8 @@ class Lens(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    k1: Annotated[float, Field(strict=True, allow_inf_nan=False), AfterValidator(_k1)]
-    k1_sd: Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=MAX_K1_SD)] = 0.0
+    k1: Annotated[Number, refused(dict.fromkeys((f"< {MIN_K1}", f"> {MAX_K1}"), NO_K1))]
+    k1_sd: Annotated[Number, Field(ge=0, le=0.2)] = 0.0
 
 
 def half_diagonal_px(size_px: tuple[int, int]) -> float:

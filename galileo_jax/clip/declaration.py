@@ -1,7 +1,8 @@
 """What a user says about a clip, as values of its yaml."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +15,9 @@ CLICK_SD_PX = 0.5
 """How well one reads off a pixel coordinate by eye: viewers show whole pixels, and lens and codec
 blur an edge over one or two of them."""
 
+END_TO_END_SD_PX = math.sqrt(2) * CLICK_SD_PX
+"""How well the difference of two pixels is known, along their line or across it."""
+
 NUMBERS = {
     "fps": "fps",
     "ramp_angle": "ramp_angle_deg",
@@ -24,7 +28,13 @@ NUMBERS = {
     "gravity": "gravity",
 }
 WORDS = ("scenario", "direction", "track_units", "track_y")
-POINTS = {"origin": "origin_px", "track_origin": "track_origin"}
+TWICE = (
+    ("pixels_per_metre", "scale"),
+    ("pixels_per_metre", "rectangle"),
+    ("scale", "rectangle"),
+    ("ramp_angle", "ramp"),
+)
+"""Options that say the same."""
 
 
 @dataclass(frozen=True)
@@ -62,40 +72,17 @@ class Declaration:
         Raises:
           InputError: a value is no number, two pixels are no line, or two options say the same.
         """
-        for one, other in (
-            ("pixels_per_metre", "scale"),
-            ("pixels_per_metre", "rectangle"),
-            ("scale", "rectangle"),
-            ("ramp_angle", "ramp"),
-        ):
+        for one, other in TWICE:
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise InputError(f"{_option(one)}: not allowed with {_option(other)}")
         values: dict[str, Any] = {}
-        if self.ramp is not None:
-            values |= _ramp(*_numbers("--ramp", self.ramp, 4))
-        if self.scale is not None:
-            numbers = _numbers("--scale", self.scale, 5)
-            values |= _scale(*numbers)
-        if self.rectangle is not None:
-            numbers = _numbers("--rectangle", self.rectangle, 10)
-            corners = [numbers[i : i + 2] for i in range(0, 8, 2)]
-            values["rectangle"] = {"corners_px": corners, "sides_m": numbers[8:]}
-        if self.lens is not None:
-            numbers = _numbers("--lens", self.lens)
-            if not 1 <= len(numbers) <= 2:
-                raise InputError(f"--lens: {len(numbers)} values given; K1 or K1 SD expected")
-            values["lens"] = dict(zip(("k1", "k1_sd"), numbers, strict=False))
-        if self.origin is not None:
-            values["origin_sd_px"] = CLICK_SD_PX
-        for name, key in POINTS.items():
-            if (point := getattr(self, name)) is not None:
-                values[key] = _numbers(_option(name), point, 2)
-        for name in WORDS:
-            if (word := getattr(self, name)) is not None:
-                values[name] = word
+        for name, (count, values_of) in READ_OFF.items():
+            if (given := getattr(self, name)) is not None:
+                values |= values_of(*_numbers(_option(name), given, count))
+        values |= {key: word for key in WORDS if (word := getattr(self, key)) is not None}
         for name, key in NUMBERS.items():
             if (number := getattr(self, name)) is not None:
-                values[key] = _numbers(_option(name), [number], 1)[0]
+                (values[key],) = _numbers(_option(name), [number], 1)
         return values
 
     def object_values(self) -> dict[str, dict[str, Any]]:
@@ -104,13 +91,12 @@ class Declaration:
         Raises:
           InputError: a value is no number, or no frame.
         """
-        objects: dict[str, dict[str, Any]] = {}
+        objects: dict[str, dict[str, Any]] = defaultdict(dict)
         for name, shape in self.shape.items():
-            objects.setdefault(name, {})["shape"] = shape
-        for name, size in self.size.items():
-            objects.setdefault(name, {})["size_m"] = _numbers(f"--size {name}", size)
-        for name, point in self.point.items():
-            objects.setdefault(name, {})["point_px"] = _numbers(f"--point {name}", point, 2)
+            objects[name]["shape"] = shape
+        for option, key, count in (("size", "size_m", None), ("point", "point_px", 2)):
+            for name, given in getattr(self, option).items():
+                objects[name][key] = _numbers(f"--{option} {name}", given, count)
         for key in ("first_frame", "last_frame"):
             for name, frame in getattr(self, key).items():
                 if not (frame is None or (isinstance(frame, int) and frame >= 0)):
@@ -118,7 +104,7 @@ class Declaration:
                         f"{_option(key)} {name}: {str(frame)!r} is not a frame number from 0, or "
                         "null"
                     )
-                objects.setdefault(name, {})[key] = frame
+                objects[name][key] = frame
         return objects
 
     def corrections(self, name: str, listed: Any) -> list[list[float]]:
@@ -162,7 +148,7 @@ def _ramp(x1: float, y1: float, x2: float, y2: float) -> dict[str, Any]:
             f"--ramp: the two pixels differ by {dx:g} and {dy:g}; a sloping line expected"
         )
     angle = math.degrees(math.atan2(abs(dy), abs(dx)))
-    sd = math.degrees(_end_to_end_sd_px() / math.hypot(dx, dy))
+    sd = math.degrees(END_TO_END_SD_PX / math.hypot(dx, dy))
     return {
         "ramp_angle_deg": round(angle, 3),
         "ramp_angle_sd_deg": float(f"{sd:.3g}"),
@@ -179,10 +165,27 @@ def _scale(x1: float, y1: float, x2: float, y2: float, metres: float) -> dict[st
         raise InputError(f"--scale: {metres:g} is not a distance; metres above 0 expected")
     return {
         "pixels_per_metre": round(distance / metres, 3),
-        "pixels_per_metre_sd": float(f"{_end_to_end_sd_px() / metres:.3g}"),
+        "pixels_per_metre_sd": float(f"{END_TO_END_SD_PX / metres:.3g}"),
     }
 
 
-def _end_to_end_sd_px() -> float:
-    """How well the difference of two pixels is known, along their line or across it."""
-    return math.sqrt(2) * CLICK_SD_PX
+def _rectangle(*numbers: float) -> dict[str, Any]:
+    corners = [list(numbers[i : i + 2]) for i in range(0, 8, 2)]
+    return {"rectangle": {"corners_px": corners, "sides_m": list(numbers[8:])}}
+
+
+def _lens(*numbers: float) -> dict[str, Any]:
+    if not 1 <= len(numbers) <= 2:
+        raise InputError(f"--lens: {len(numbers)} values given; K1 or K1 SD expected")
+    return {"lens": dict(zip(("k1", "k1_sd"), numbers, strict=False))}
+
+
+READ_OFF: dict[str, tuple[int | None, Callable[..., dict[str, Any]]]] = {
+    "ramp": (4, _ramp),
+    "scale": (5, _scale),
+    "rectangle": (10, _rectangle),
+    "lens": (None, _lens),
+    "origin": (2, lambda x, y: {"origin_px": [x, y], "origin_sd_px": CLICK_SD_PX}),
+    "track_origin": (2, lambda x, y: {"track_origin": [x, y]}),
+}
+"""By option how many numbers it takes, and the yaml's values that they tell."""

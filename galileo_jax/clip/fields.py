@@ -1,6 +1,7 @@
 """The kinds of values in a clip's yaml: each checked for type, range and mistaken units."""
 
 import math
+import operator
 import reprlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -23,18 +24,15 @@ SIZE_MEANING: dict[str, str] = {
 
 MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
 MAX_ACROSS_M = 0.5
-MIN_THREAD_M, MAX_THREAD_M = 0.01, 30.0
 MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
-MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
-MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
-MIN_DENSITY, MAX_DENSITY = 100.0, 20_000.0  # kg/m^3, of a liquid
 MAX_SPIN_RAD_S = 5000.0  # of a table-tennis ball 1000
-MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
 MAX_FLOOR_M = 1e6
 MAX_ANGLE_SD_DEG = 10.0
 MAX_SCALE_SD_SHARE = 0.2  # a scale known worse than this is a guess: leave it null
 MAX_ORIGIN_SD_PX = 50.0  # a foot known worse than this is null: found from the path
 MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
+
+COMPARED = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
 def wrong(message: str) -> PydanticCustomError:
@@ -42,119 +40,32 @@ def wrong(message: str) -> PydanticCustomError:
     return PydanticCustomError("clip", "{text}", {"text": message})
 
 
-def _suggestion(value: float, *factors_and_units: tuple[float, str]) -> str:
-    """' did you mean 0.06 (60 mm)?' for the first (factor, unit) that is given."""
-    factor, unit = factors_and_units[0]
-    return f"did you mean {value * factor:g} ({value:g} {unit})?"
+def refused(problems: dict[str, str]) -> AfterValidator:
+    """Refuses numbers: by comparison (`"> 2.0"`), the first that holds, what is wrong with one.
 
-
-def _metres(value: float) -> float:
-    if value <= 0:
-        raise wrong(f"{value:g} is not a length; metres above 0 expected")
-    if value > MAX_SIZE_M:
-        hint = _suggestion(value, (0.01, "cm") if value < 20 else (0.001, "mm"))
-        raise wrong(f"{value:g} m is too large for an object; metres expected; {hint}")
-    if value < MIN_SIZE_M:
-        raise wrong(f"{value:g} m is smaller than a millimetre; metres expected")
-    return value
-
-
-def _across(value: float) -> float:
-    if abs(value) > MAX_ACROSS_M:
-        hint = _suggestion(value, (0.01, "cm") if abs(value) < 20 else (0.001, "mm"))
-        raise wrong(f"{value:g} m is too far from the plane of the motion; metres expected; {hint}")
-    return value
-
-
-def _thread(value: float) -> float:
-    if not MIN_THREAD_M <= value <= MAX_THREAD_M:
-        hint = "; " + _suggestion(value, (0.01, "cm")) if value > MAX_THREAD_M else ""
-        raise wrong(
-            f"{value:g} m is not a length of a thread; {MIN_THREAD_M:g} to {MAX_THREAD_M:g} m "
-            f"expected{hint}"
-        )
-    return value
-
-
-def _kilograms(value: float) -> float:
-    if value <= 0:
-        raise wrong(f"{value:g} is not a mass; kilograms above 0 expected")
-    if value > MAX_MASS_KG:
-        hint = _suggestion(value, (0.001, "g"))
-        raise wrong(f"{value:g} kg is too heavy for an object; kilograms expected; {hint}")
-    if value < MIN_MASS_KG:
-        raise wrong(f"{value:g} kg is less than ten milligrams; kilograms expected")
-    return value
-
-
-def _pixels_per_metre(value: float) -> float:
-    if value <= 0:
-        raise wrong(f"{value:g} is not a scale; pixels per metre above 0, or null, expected")
-    if value < MIN_SCALE_PX_PER_M:
-        hint = (
-            f"did you mean {1 / value:.4g} ({value:g} metres per pixel)?"
-            if value < 0.05
-            else _suggestion(value, (1000, "pixels per millimetre"))
-        )
-        raise wrong(f"{value:g} is too small; pixels per metre expected; {hint}")
-    if value > MAX_SCALE_PX_PER_M:
-        raise wrong(
-            f"{value:g} is too large; pixels per metre expected; did you mean {value / 1000:g}?"
-        )
-    return value
-
-
-def _gravity(value: float) -> float:
-    if value <= 0:
-        hint = f"; did you mean {-value:g}?" if MIN_GRAVITY <= -value <= MAX_GRAVITY else ""
-        raise wrong(f"{value:g} is not above 0; the size of gravity in m/s^2 expected{hint}")
-    if value > MAX_GRAVITY:
-        raise wrong(
-            f"{value:g} is too large; m/s^2 expected; " + _suggestion(value, (0.01, "cm/s^2"))
-        )
-    if value < MIN_GRAVITY:
-        raise wrong(f"{value:g} is too small; m/s^2 expected (9.81 on earth)")
-    return value
-
-
-def _fps(value: float) -> float:
-    if value <= 0:
-        raise wrong(f"{value:g} is not above 0; frames per second expected")
-    if value < MIN_FPS:
-        hint = f"did you mean {1 / value:.4g} ({value:g} seconds per frame)?"
-        raise wrong(f"{value:g} is too small; frames per second expected; {hint}")
-    if value > MAX_FPS:
-        raise wrong(f"{value:g} is too large; frames per second expected")
-    return value
-
-
-def _ramp_angle_deg(value: float) -> float:
-    if not 0 < value < 90:
-        raise wrong(f"{value:g} is outside (0, 90) degrees")
-    if value < MIN_RAMP_ANGLE_DEG:
-        degrees = math.degrees(value)
-        raise wrong(
-            f"{value:g} is too flat to slide; degrees expected; "
-            f"did you mean {degrees:.4g} ({value:g} radians)?"
-        )
-    return value
-
-
-def _up_to(most: float, unit: str) -> AfterValidator:
-    """Refuses what is negative, or more than `most`."""
+    In the text `{v}` is the number, `{centi}` a hundredth of it, and so on.
+    """
+    rules = [(*rule.split(), text) for rule, text in problems.items()]
 
     def check(value: float) -> float:
-        if not 0 <= value <= most:
-            raise wrong(f"{value:g} is outside [0, {most:g}] {unit}")
+        for sign, limit, text in rules:
+            if COMPARED[sign](value, float(limit)):
+                parts = {"centi": 0.01 * value, "milli": 0.001 * value, "kilo": 1000 * value}
+                parts |= {"inverse": 1 / (value or math.nan), "degrees": math.degrees(value)}
+                raise wrong(text.format(v=value, minus=-value, **parts))
         return value
 
     return AfterValidator(check)
 
 
-def _scale_sd(value: float) -> float:
-    if value < 0:
-        raise wrong(f"{value:g} is negative; pixels per metre, 0 or more, expected")
-    return value
+def _within(low: float, high: float, unit: str) -> AfterValidator:
+    problem = f"{{v:g}} is outside [{low:g}, {high:g}] {unit}"
+    return refused({f"< {low}": problem, f"> {high}": problem})
+
+
+def is_number(value: Any, below: float = math.inf) -> bool:
+    """Whether a value of a yaml is a number, which `true` is not, and no larger; also no NaN."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < below
 
 
 def _floor(value: Any) -> Any:
@@ -173,22 +84,8 @@ def _rolls(value: Any) -> Any:
         return float(value)
     raise wrong(
         f"{short(value)} is not a share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow "
-        "ball), "
-        "or true (solid), expected"
+        "ball), or true (solid), expected"
     )
-
-
-def _liquid_density(value: float) -> float:
-    if value <= 0:
-        raise wrong(f"{value:g} is not a density; kg/m^3 above 0 expected")
-    if value < MIN_DENSITY:
-        raise wrong(
-            f"{value:g} is too small for a liquid; kg/m^3 expected; "
-            + _suggestion(value, (1000, "g/cm^3"))
-        )
-    if value > MAX_DENSITY:
-        raise wrong(f"{value:g} is too large; kg/m^3 expected (water: 998)")
-    return value
 
 
 def _point_px(value: tuple[float, float]) -> tuple[float, float]:
@@ -202,12 +99,9 @@ def _spin(value: Any) -> Any:
     if value is None:
         return None
     is_list = isinstance(value, list | tuple)
-    if not is_list or len(value) != 3 or not all(map(_is_real, value)):
-        has = (
-            f"has {len(value)} values"
-            if is_list and len(value) != 3
-            else "is not a list of numbers"
-        )
+    if not is_list or len(value) != 3 or not all(map(is_number, value)):
+        is_short = is_list and len(value) != 3
+        has = f"has {len(value)} values" if is_short else "is not a list of numbers"
         raise wrong(f"{short(value)} {has}; [x, y, z] in rad/s expected")
     if max(map(abs, value)) > MAX_SPIN_RAD_S:
         raise wrong(
@@ -215,11 +109,6 @@ def _spin(value: Any) -> Any:
             "turns per minute or degrees per second?"
         )
     return tuple(map(float, value))
-
-
-def _is_real(value: Any) -> bool:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)
 
 
 def _name(value: str) -> str:
@@ -235,8 +124,7 @@ def _corrections(value: Any) -> Any:
     is_list = isinstance(value, list | tuple)
     if not is_list or not all(isinstance(one, list | tuple) and len(one) == 3 for one in value):
         raise wrong(f"{short(value)} is not a list of [frame, x, y], such as [[24, 312.0, 221.5]]")
-    frames = [one[0] for one in value]
-    if len({*map(str, frames)}) < len(frames):
+    if len({str(one[0]) for one in value}) < len(value):
         raise wrong(f"{short(value)} has a frame twice; one place for each frame expected")
     return tuple(map(tuple, value))
 
@@ -247,17 +135,6 @@ def _path(value: Any) -> Any:
     if isinstance(value, Path) or value is None:
         return value
     raise wrong(f"{short(value)} is not a file name")
-
-
-def one_of(known: tuple[str, ...]) -> BeforeValidator:
-    """Refuses anything but the `known` words and lists them."""
-
-    def check(value: Any) -> Any:
-        if not isinstance(value, str) or value not in known:
-            raise wrong(f"unknown value {short(value)}; known: {', '.join(known)}")
-        return value
-
-    return BeforeValidator(check)
 
 
 _REPR = reprlib.Repr()  # aliases in a yaml can make a value that is endless when written out
@@ -275,27 +152,81 @@ def short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+_TOO_LARGE = "{v:g} m is too large for an object; metres expected; did you mean "
+_TOO_FAR = "{v:g} m is too far from the plane of the motion; metres expected; did you mean "
+_NO_THREAD = "{v:g} m is not a length of a thread; 0.01 to 30 m expected"
+_SMALL_SCALE = "{v:g} is too small; pixels per metre expected; did you mean "
+_NO_GRAVITY = "{v:g} is not above 0; the size of gravity in m/s^2 expected"
+_IN_CM, _IN_MM = "{centi:g} ({v:g} cm)?", "{milli:g} ({v:g} mm)?"
+
+Yes = Annotated[bool, Field(strict=True)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Frame = Annotated[int, Field(strict=True, ge=0)]
 Trial = Annotated[int, Field(strict=True, ge=1)] | None
 Point = tuple[Number, Number]
-Correction = tuple[Frame, Number, Number]
-Metres = Annotated[Number, AfterValidator(_metres)]
-Kilograms = Annotated[Number, AfterValidator(_kilograms)]
+Metres = Annotated[Number, refused({
+    "<= 0": "{v:g} is not a length; metres above 0 expected",
+    ">= 20": _TOO_LARGE + _IN_MM,
+    f"> {MAX_SIZE_M}": _TOO_LARGE + _IN_CM,
+    f"< {MIN_SIZE_M}": "{v:g} m is smaller than a millimetre; metres expected",
+})]  # fmt: skip
+Kilograms = Annotated[Number, refused({
+    "<= 0": "{v:g} is not a mass; kilograms above 0 expected",
+    "> 100": "{v:g} kg is too heavy for an object; kilograms expected; did you mean "
+             "{milli:g} ({v:g} g)?",
+    "< 1e-5": "{v:g} kg is less than ten milligrams; kilograms expected",
+})]  # fmt: skip
+Across = Annotated[Number, refused({
+    ">= 20": _TOO_FAR + _IN_MM,
+    "<= -20": _TOO_FAR + _IN_MM,
+    f"> {MAX_ACROSS_M}": _TOO_FAR + _IN_CM,
+    f"< -{MAX_ACROSS_M}": _TOO_FAR + _IN_CM,
+})]  # fmt: skip
+Thread = Annotated[Number, refused({
+    "> 30": f"{_NO_THREAD}; did you mean {_IN_CM}",
+    "< 0.01": _NO_THREAD,
+})]  # fmt: skip
+Scale = Annotated[Number, refused({
+    "<= 0": "{v:g} is not a scale; pixels per metre above 0, or null, expected",
+    "< 0.05": _SMALL_SCALE + "{inverse:.4g} ({v:g} metres per pixel)?",
+    f"< {MIN_SCALE_PX_PER_M}": _SMALL_SCALE + "{kilo:g} ({v:g} pixels per millimetre)?",
+    f"> {MAX_SCALE_PX_PER_M}": "{v:g} is too large; pixels per metre expected; did you mean "
+                               "{milli:g}?",
+})]  # fmt: skip
+ScaleSd = Annotated[Number, refused({
+    "< 0": "{v:g} is negative; pixels per metre, 0 or more, expected",
+})]  # fmt: skip
+Gravity = Annotated[Number, refused({
+    "< -30": _NO_GRAVITY,
+    "<= -0.1": _NO_GRAVITY + "; did you mean {minus:g}?",
+    "<= 0": _NO_GRAVITY,
+    "> 30": "{v:g} is too large; m/s^2 expected; did you mean {centi:g} ({v:g} cm/s^2)?",
+    "< 0.1": "{v:g} is too small; m/s^2 expected (9.81 on earth)",
+})]  # fmt: skip
+FrameRate = Annotated[Number, refused({
+    "<= 0": "{v:g} is not above 0; frames per second expected",
+    "< 1": "{v:g} is too small; frames per second expected; did you mean {inverse:.4g} "
+           "({v:g} seconds per frame)?",
+    "> 1e6": "{v:g} is too large; frames per second expected",
+})]  # fmt: skip
+RampAngle = Annotated[Number, refused({
+    "<= 0": "{v:g} is outside (0, 90) degrees",
+    ">= 90": "{v:g} is outside (0, 90) degrees",
+    f"< {MIN_RAMP_ANGLE_DEG}": "{v:g} is too flat to slide; degrees expected; did you mean "
+                               "{degrees:.4g} ({v:g} radians)?",
+})]  # fmt: skip
+LiquidDensity = Annotated[Number, refused({
+    "<= 0": "{v:g} is not a density; kg/m^3 above 0 expected",
+    "< 100": "{v:g} is too small for a liquid; kg/m^3 expected; did you mean {kilo:g} "
+             "({v:g} g/cm^3)?",
+    "> 20000": "{v:g} is too large; kg/m^3 expected (water: 998)",
+})]  # fmt: skip
+AngleSd = Annotated[Number, _within(0, MAX_ANGLE_SD_DEG, "degrees")]
+OriginSd = Annotated[Number, _within(0, MAX_ORIGIN_SD_PX, "pixels")]
 File = Annotated[Path | None, BeforeValidator(_path)]
 OneLine = Annotated[str, Field(strict=True, min_length=1, max_length=80)]
-Across = Annotated[Number, AfterValidator(_across)]
-Thread = Annotated[Number, AfterValidator(_thread)]
-Scale = Annotated[Number, AfterValidator(_pixels_per_metre)]
-ScaleSd = Annotated[Number, AfterValidator(_scale_sd)]
-Gravity = Annotated[Number, AfterValidator(_gravity)]
-FrameRate = Annotated[Number, AfterValidator(_fps)]
-RampAngle = Annotated[Number, AfterValidator(_ramp_angle_deg)]
-AngleSd = Annotated[Number, _up_to(MAX_ANGLE_SD_DEG, "degrees")]
-OriginSd = Annotated[Number, _up_to(MAX_ORIGIN_SD_PX, "pixels")]
-LiquidDensity = Annotated[Number, AfterValidator(_liquid_density)]
 MarkedPoint = Annotated[Point, AfterValidator(_point_px)]
-Corrections = Annotated[tuple[Correction, ...], BeforeValidator(_corrections)]
+Corrections = Annotated[tuple[tuple[Frame, Number, Number], ...], BeforeValidator(_corrections)]
 Spin = Annotated[tuple[float, float, float] | None, BeforeValidator(_spin)]
 Rolls = Annotated[bool | float | None, BeforeValidator(_rolls)]
 Floor = Annotated[bool | float | None, BeforeValidator(_floor)]

@@ -1,12 +1,15 @@
 """Writing what is known about a clip into the yaml beside it, if the result is valid."""
 
 import copy
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.clip.declaration import LEVELS, Declaration
+import numpy as np
+
+from galileo_jax.clip.declaration import CLICK_SD_PX, LEVELS, Declaration
 from galileo_jax.clip.load import (
     YAML_SUFFIXES,
     check_belongs,
@@ -15,7 +18,7 @@ from galileo_jax.clip.load import (
     has_yaml,
     with_unused,
 )
-from galileo_jax.clip.ramp_in_plane import ramp_in_plane
+from galileo_jax.clip.picture_plane import PicturePlane, nearby_planes, picture_plane
 from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
@@ -26,26 +29,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.video.decode import probe
 
-KEY_ORDER = (
-    "video",
-    "track",
-    "track_units",
-    "track_y",
-    "track_origin",
-    "scenario",
-    "fps",
-    "ramp_angle_deg",
-    "ramp_angle_sd_deg",
-    "direction",
-    "pixels_per_metre",
-    "pixels_per_metre_sd",
-    "rectangle",
-    "lens",
-    "origin_px",
-    "origin_sd_px",
-    "gravity",
-    "objects",
-)
+KEY_ORDER = tuple(ClipFile.model_fields)
 
 # What says the same in another way goes.
 REPLACES = {
@@ -107,7 +91,7 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     clip = check_clip(yaml_path, content)
     if declared.ramp is not None and not clip.is_camera_plain:
         given = {} if declared.ramp_angle_sd is None else {"ramp_angle_sd_deg"}
-        found = ramp_in_plane(clip, declared.ramp)
+        found = _ramp_in_plane(clip, declared.ramp)
         content |= {key: value for key, value in found.items() if key not in given}
         clip = check_clip(yaml_path, content)
     clip = with_unused(clip)
@@ -174,3 +158,29 @@ def _with_objects(
             listed.append({"name": name, "shape": "box"} | dict(values))
             names.append(name)
     return listed
+
+
+def _ramp_in_plane(clip: Clip, line: Sequence[float]) -> dict[str, Any]:
+    """`ramp_angle_deg` and its standard deviation, by the declared rectangle or lens.
+
+    Args:
+      clip: with one of these.
+      line: (x1, y1, x2, y2), px, on the ramp. Half a pixel of each of its coordinates and of the
+        rectangle's, and what is open of the lens, make up the standard deviation.
+    """
+    ends = np.array(line, float).reshape(2, 2)
+    angle = _angle_deg(picture_plane(clip, ends[0]), ends)
+    apart = [
+        _angle_deg(picture_plane(clip, ends[0]), ends + step)
+        - _angle_deg(picture_plane(clip, ends[0]), ends - step)
+        for step in CLICK_SD_PX * np.eye(4).reshape(4, 2, 2)
+    ]
+    for more, less in nearby_planes(clip, ends[0]):
+        apart.append(_angle_deg(more, ends) - _angle_deg(less, ends))
+    read_off = math.hypot(*apart) / 2
+    return {"ramp_angle_deg": round(angle, 3), "ramp_angle_sd_deg": float(f"{read_off:.3g}")}
+
+
+def _angle_deg(plane: PicturePlane, ends: np.ndarray) -> float:
+    x, y = np.diff(plane.to_metres(ends), axis=0)[0]
+    return math.degrees(math.atan2(abs(y), abs(x)))

@@ -30,49 +30,6 @@ GAP = 1.5
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What was understood of a table.
-
-    Attributes:
-      path: the file.
-      columns: role, unit and resolution of each.
-      names: of the objects.
-      num_rows: of the table.
-      step: the usual time between rows, s, or in frames where it has no times.
-      is_in_frames: the file counts frames; `fps` makes them seconds.
-      gaps: (row, how many steps long) of the longer ones, from 0.
-      unit: of length; None where the file does not say.
-      axes: that were measured.
-      moved: how far object 1 moves along each axis, in the file's unit.
-      scenario: the likeliest kind of motion.
-      why: what speaks for it, one phrase.
-      is_clear: no other kind of motion looks like it.
-      slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
-      swings: how often it turns back by more than half of its way.
-      yaml: that would be written beside the file.
-      warnings: doubts, one line each.
-    """
-
-    path: Path
-    columns: tuple[Column, ...]
-    names: tuple[str, ...]
-    num_rows: int
-    step: float
-    is_in_frames: bool
-    gaps: tuple[tuple[int, float], ...]
-    unit: str | None
-    axes: tuple[str, ...]
-    moved: tuple[float, ...]
-    scenario: str
-    why: str
-    yaml: str
-    warnings: tuple[str, ...] = ()
-    is_clear: bool = False
-    slope_deg: float | None = None
-    swings: int = 0
-
-
-@dataclass(frozen=True)
 class Likely:
     """The likeliest kind of motion of a path.
 
@@ -91,49 +48,73 @@ class Likely:
     swings: int = 0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Seen(Likely):
+    """What was understood of a table, and of object 1 in it.
+
+    Attributes:
+      path: the file.
+      columns: role, unit and resolution of each.
+      names: of the objects.
+      num_rows: of the table.
+      step: the usual time between rows, s, or in frames where it has no times.
+      is_in_frames: the file counts frames; `fps` makes them seconds.
+      gaps: (row, how many steps long) of the longer ones, from 0.
+      unit: of length; None where the file does not say.
+      axes: that were measured.
+      moved: how far object 1 moves along each axis, in the file's unit.
+      yaml: that would be written beside the file.
+      warnings: doubts, one line each.
+    """
+
+    path: Path
+    columns: tuple[Column, ...]
+    names: tuple[str, ...]
+    num_rows: int
+    step: float
+    is_in_frames: bool
+    gaps: tuple[tuple[int, float], ...]
+    unit: str | None
+    axes: tuple[str, ...]
+    moved: tuple[float, ...]
+    yaml: str
+    warnings: tuple[str, ...] = ()
+
+
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
     """What a table shows; `fps` makes its frames seconds."""
     warnings = table.warnings
     if (count := len(table.starts)) > 1:
         warnings += (f"{path}: {count} motions, of which the first is looked at",)
         table = table.motion(1)
-    clock = table.clock
     is_in_frames = table.times_s is None
-    steps = np.diff(clock)
+    steps = np.diff(table.clock)
     step = float(np.median(steps)) if steps.size else math.nan
-    gaps = tuple((int(n), float(steps[n] / step)) for n in np.flatnonzero(steps > GAP * step))
     place = table.position[0]
     shown = np.isfinite(place).all(axis=0)
-    moved = tuple(float(np.ptp(one[shown])) if shown.any() else 0.0 for one in place)
     frame_s = (1 / fps if fps else table.frame_s) if is_in_frames else 1.0
-    seconds = clock[shown] * (frame_s or math.nan)
-    per_unit = METRES_PER_UNIT.get(table.unit or "", math.nan)
-    likely = _likely(table, seconds, place[:, shown], per_unit)
+    seconds = table.clock[shown] * (frame_s or math.nan)
+    likely = _likely(table, seconds, place[:, shown])
     return Seen(
-        path,
-        table.columns,
-        table.names,
-        table.position.shape[-1],
-        step,
-        is_in_frames,
-        gaps,
-        table.unit,
-        table.axes,
-        moved,
-        likely.scenario,
-        likely.why,
-        proposed_yaml(path, table, likely.scenario, fps, count),
-        warnings,
-        likely.is_clear,
-        likely.slope_deg,
-        likely.swings,
+        **vars(likely),
+        path=path,
+        columns=table.columns,
+        names=table.names,
+        num_rows=table.position.shape[-1],
+        step=step,
+        is_in_frames=is_in_frames,
+        gaps=tuple((int(n), float(steps[n] / step)) for n in np.flatnonzero(steps > GAP * step)),
+        unit=table.unit,
+        axes=table.axes,
+        moved=tuple(float(np.ptp(one[shown])) if shown.any() else 0.0 for one in place),
+        yaml=proposed_yaml(path, table, likely.scenario, fps, count),
+        warnings=warnings,
     )
 
 
-def _likely(
-    table: TrackTable, seconds: np.ndarray, place: np.ndarray, metres_per_unit: float
-) -> Likely:
+def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely:
     """The likeliest scenario of object 1's path."""
+    metres_per_unit = METRES_PER_UNIT.get(table.unit or "", math.nan)
     if len(table.names) > 1:
         why = f"{len(table.names)} objects; a ramp, if one slides down into others"
         return Likely("from_above", why)

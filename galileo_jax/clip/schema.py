@@ -6,43 +6,12 @@ out. What a value may be is in `fields`; checks that need several values, or the
 """
 
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from galileo_jax.clip import fields
 from galileo_jax.clip.camera_geometry import Lens, Rectangle
-from galileo_jax.clip.fields import (
-    Across,
-    AngleSd,
-    Corrections,
-    Direction,
-    File,
-    Floor,
-    Frame,
-    FrameRate,
-    Gravity,
-    Kilograms,
-    LengthUnit,
-    LiquidDensity,
-    MarkedPoint,
-    Metres,
-    Number,
-    ObjectName,
-    OneLine,
-    OriginSd,
-    Point,
-    RampAngle,
-    Rolls,
-    Scale,
-    ScaleSd,
-    Shape,
-    Spin,
-    Thread,
-    Trial,
-    UpAxis,
-    YAxis,
-    one_of,
-)
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.walls import Walls
 
@@ -75,19 +44,19 @@ class ClipObject(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: ObjectName
-    shape: Annotated[Shape, one_of(get_args(Shape))]
-    size_m: tuple[Metres, ...] | None = None
-    mass_kg: Kilograms | None = None
-    point_px: MarkedPoint | None = None
-    first_frame: Frame | None = 0
-    last_frame: Frame | None = None
-    corrections: Corrections = ()
-    rolls: Rolls = None
-    z_m: Across = 0.0
-    spin_rad_s: Spin = None
-    track_name: OneLine | None = None
-    track_file: File = None
+    name: fields.ObjectName
+    shape: fields.Shape
+    size_m: tuple[fields.Metres, ...] | None = None
+    mass_kg: fields.Kilograms | None = None
+    point_px: fields.MarkedPoint | None = None
+    first_frame: fields.Frame | None = 0
+    last_frame: fields.Frame | None = None
+    corrections: fields.Corrections = ()
+    rolls: fields.Rolls = None
+    z_m: fields.Across = 0.0
+    spin_rad_s: fields.Spin = None
+    track_name: fields.OneLine | None = None
+    track_file: fields.File = None
 
     @property
     def roll_inertia(self) -> float | None:
@@ -115,39 +84,46 @@ UNCERTAINTY_OF = {
 """By key the one that says how well it is known."""
 
 
+def _scenario(value: Any) -> Any:
+    if not isinstance(value, str) or value not in SCENARIOS:
+        known = ", ".join(SCENARIOS)
+        raise fields.wrong(f"unknown value {fields.short(value)}; known: {known}")
+    return value
+
+
 class ClipFile(BaseModel):
     """The keys of a clip yaml; see `Clip` for their meaning."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    video: File = None
-    track: File = None
-    trial: Trial = None
-    track_units: Annotated[LengthUnit, one_of(get_args(LengthUnit))] | None = None
-    track_y: Annotated[YAxis, one_of(get_args(YAxis))] | None = None
-    track_origin: Point | None = None
-    track_up: Annotated[UpAxis, one_of(get_args(UpAxis))] = "y"
-    scenario: Annotated[str, one_of(tuple(SCENARIOS))]
-    fps: FrameRate
-    ramp_angle_deg: RampAngle | None = None
-    ramp_angle_sd_deg: AngleSd = 0.0
-    direction: Annotated[Direction, one_of(get_args(Direction))] = "right"
-    pixels_per_metre: Scale | None = None
-    pixels_per_metre_sd: ScaleSd | None = None
+    video: fields.File = None
+    track: fields.File = None
+    trial: fields.Trial = None
+    track_units: fields.LengthUnit | None = None
+    track_y: fields.YAxis | None = None
+    track_origin: fields.Point | None = None
+    track_up: fields.UpAxis = "y"
+    scenario: Annotated[str, BeforeValidator(_scenario)]
+    fps: fields.FrameRate
+    ramp_angle_deg: fields.RampAngle | None = None
+    ramp_angle_sd_deg: fields.AngleSd = 0.0
+    direction: fields.Direction = "right"
+    pixels_per_metre: fields.Scale | None = None
+    pixels_per_metre_sd: fields.ScaleSd | None = None
     rectangle: Rectangle | None = None
     lens: Lens | None = None
-    origin_px: Point | None = None
-    origin_sd_px: OriginSd = 0.0
-    gravity: Gravity = 9.81
-    vertical_sd_deg: AngleSd = 0.0
-    launch_angle_deg: Annotated[Number, Field(gt=-90, lt=90)] | None = None
-    starts_moving: Annotated[bool, Field(strict=True)] | None = None
-    floor: Floor = None
-    liquid_density: LiquidDensity | None = None
-    thread_m: Thread | None = None
-    pivot_m: Point | None = None
+    origin_px: fields.Point | None = None
+    origin_sd_px: fields.OriginSd = 0.0
+    gravity: fields.Gravity = 9.81
+    vertical_sd_deg: fields.AngleSd = 0.0
+    launch_angle_deg: Annotated[fields.Number, Field(gt=-90, lt=90)] | None = None
+    starts_moving: fields.Yes | None = None
+    floor: fields.Floor = None
+    liquid_density: fields.LiquidDensity | None = None
+    thread_m: fields.Thread | None = None
+    pivot_m: fields.Point | None = None
     walls: Walls = ()
-    turning: Annotated[bool, Field(strict=True)] = False
+    turning: fields.Yes = False
     objects: tuple[ClipObject, ...]
 
 

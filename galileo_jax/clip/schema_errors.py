@@ -46,48 +46,49 @@ def _key(loc: tuple[int | str, ...]) -> str:
     return " ".join(text.split())[:80]
 
 
+PROBLEMS = {
+    "clip": "{msg}",
+    "literal_error": "unknown value {found}; known: {known}",
+    "too_long": "{found} has too many values; [x, y] expected",
+    "tuple_type": "{found} is not a list; {list} expected",
+    **dict.fromkeys(
+        ("model_type", "dict_type", "model_attributes_type"),
+        "{found} is not a mapping; {keys} expected",
+    ),
+    "string_type": "{found} is not text",
+    **dict.fromkeys(("int_type", "int_from_float"), "{found} is not a whole number"),
+    "greater_than_equal": "{found} is negative; 0 or more expected",
+    "finite_number": "{found} is not finite; a number expected",
+    "float_type": "{found} is not a number{hint}",
+}
+"""By pydantic's type of an error, what to say; of others its own words."""
+
+LISTS = {
+    "objects": "a list with one entry per object",
+    "size_m": "a list of metres, such as [0.06, 0.06, 0.06], or null",
+}
+"""By key, which list is expected; of others a point."""
+
+
 def _problem(error: ErrorDetails) -> str:
     loc, value = error["loc"], error["input"]
-    found = short(value)
     model = MODELS.get(loc[0] if loc else "", ClipFile)
     match error["type"]:
-        case "clip":
-            return error["msg"]
         case "extra_forbidden" | "invalid_key":
             return unknown_key(loc[-1], model)
+        case "missing" if isinstance(loc[-1], int):
+            return "missing; [x, y] expected"
         case "missing":
-            example = EXAMPLES.get(str(loc[-1]))
-            is_in_pair = isinstance(loc[-1], int)
-            return "missing; [x, y] expected" if is_in_pair else f"missing; write {example}"
-        case "too_long":
-            return f"{found} has too many values; [x, y] expected"
-        case "tuple_type":
-            return f"{found} is not a list; {_expected_list(loc)} expected"
-        case "model_type" | "dict_type" | "model_attributes_type":
-            keys = "from_m, to_m" if model is Wall else "name, shape, size_m, point_px"
-            return f"{found} is not a mapping; {keys} expected"
-        case "string_type":
-            return f"{found} is not text"
-        case "int_type" | "int_from_float":
-            return f"{found} is not a whole number"
-        case "greater_than_equal":
-            return f"{found} is negative; 0 or more expected"
-        case "finite_number":
-            return f"{found} is not finite; a number expected"
-        case "float_type":
-            return f"{found} is not a number{_number_hint(value)}"
-        case _:
-            return f"{found}: {error['msg']}"
-
-
-def _expected_list(loc: tuple[int | str, ...]) -> str:
-    match loc[-1]:
-        case "objects":
-            return "a list with one entry per object"
-        case "size_m":
-            return "a list of metres, such as [0.06, 0.06, 0.06], or null"
-        case _:
-            return "[x, y] in pixels"
+            return f"missing; write {EXAMPLES.get(str(loc[-1]))}"
+    expected = str(error.get("ctx", {}).get("expected", ""))
+    return PROBLEMS.get(error["type"], "{found}: {msg}").format(
+        msg=error["msg"],
+        found=short(value),
+        known=expected.replace("'", "").replace(" or ", ", "),
+        list=LISTS.get(str(loc[-1]) if loc else "", "[x, y] in pixels"),
+        keys="from_m, to_m" if model is Wall else "name, shape, size_m, point_px",
+        hint=_number_hint(value),
+    )
 
 
 def _number_hint(value: Any) -> str:

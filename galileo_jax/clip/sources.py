@@ -3,10 +3,10 @@
 A package beside the core registers one; `load_clip` and sweeps then take its clips by their path.
 """
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from galileo_jax.runtime.registry import Registry
 
@@ -33,47 +33,28 @@ class SourceFiles:
     declared: str
 
 
-class ClipSource(ABC):
-    """A data set.
+@dataclass(frozen=True)
+class ClipSource:
+    """A data set; what its functions refuse is an `InputError`, one line.
 
     Attributes:
       name: in the registry.
+      recognises: whether a video, which has no yaml beside it, belongs to it.
+      load: the checked clip of a video; values that are given win over what is declared.
+      label: writes what a user says about a video where the data set keeps it, or nothing.
+      files: the files of a video's clip; what is wrong with them is for `load` to say.
     """
 
-    name: ClassVar[str]
-
-    @staticmethod
-    @abstractmethod
-    def recognises(path: Path) -> bool:
-        """Whether a video, which has no yaml beside it, belongs to the data set."""
-
-    @staticmethod
-    @abstractmethod
-    def load(path: Path, given: dict[str, Any]) -> "Clip":
-        """The checked clip of a video; `given` are values that win over what is declared.
-
-        Raises:
-          InputError: one line, for whatever is wrong.
-        """
-
-    @staticmethod
-    @abstractmethod
-    def label(path: Path, declared: "Declaration") -> "LabelledClip":
-        """Writes what a user says about a video where the data set keeps it.
-
-        Raises:
-          InputError: one line; nothing is written then.
-        """
-
-    @staticmethod
-    @abstractmethod
-    def files(path: Path) -> SourceFiles:
-        """The files of a video's clip; what is wrong with them is for `load` to say."""
+    name: str
+    recognises: Callable[[Path], bool]
+    load: Callable[[Path, dict[str, Any]], "Clip"]
+    label: Callable[[Path, "Declaration"], "LabelledClip"]
+    files: Callable[[Path], SourceFiles]
 
 
-SOURCES: Registry[type[ClipSource]] = Registry("clip source", "clip sources")
+SOURCES: Registry[ClipSource] = Registry("clip source", "clip sources")
 
 
-def source_of(path: Path) -> type[ClipSource] | None:
+def source_of(path: Path) -> ClipSource | None:
     """The source that recognises a video; None where none does."""
     return next((source for source in SOURCES.values() if source.recognises(path)), None)

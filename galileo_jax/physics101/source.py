@@ -22,41 +22,27 @@ from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
 
-@SOURCES.register
-class Physics101(ClipSource):
-    """Videos in folders named as the data set names them."""
+def _load(path: Path, given: dict[str, Any]) -> Clip:
+    place = _place(path)
+    return check_place(place, read_labels(place.labels), given)
 
-    name = "physics101"
 
-    @staticmethod
-    def recognises(path: Path) -> bool:
-        """See `ClipSource`."""
-        return place_of(path) is not None
+def _label(path: Path, declared: Declaration) -> LabelledClip:
+    return label_place(_place(path), declared)
 
-    @staticmethod
-    def load(path: Path, given: dict[str, Any]) -> Clip:
-        """See `ClipSource`."""
-        place = _place(path)
-        return check_place(place, read_labels(place.labels), given)
 
-    @staticmethod
-    def label(path: Path, declared: Declaration) -> LabelledClip:
-        """See `ClipSource`."""
-        return label_place(_place(path), declared)
-
-    @staticmethod
-    def files(path: Path) -> SourceFiles:
-        """See `ClipSource`. A label of another clip does not make it another."""
-        place = _place(path)
-        paths = tuple(file for file in (path, place.labels) if file.is_file())
-        try:
-            labels = read_labels(place.labels)
-        except InputError:
-            said = None
-        else:
-            own = [labels.clips.get(level) for level in place.levels]
-            said = [place.levels[-1], labels.things, own]
-        return SourceFiles(place.yaml.stem, place.root, paths, json.dumps(said, sort_keys=True))
+def _files(path: Path) -> SourceFiles:
+    """A label of another clip does not make it another."""
+    place = _place(path)
+    paths = tuple(file for file in (path, place.labels) if file.is_file())
+    try:
+        labels = read_labels(place.labels)
+    except InputError:
+        said = None
+    else:
+        own = [labels.clips.get(level) for level in place.levels]
+        said = [place.levels[-1], labels.things, own]
+    return SourceFiles(place.yaml.stem, place.root, paths, json.dumps(said, sort_keys=True))
 
 
 def _place(path: Path) -> Place:
@@ -102,3 +88,8 @@ def label_place(place: Place, declared: Declaration) -> LabelledClip:
         text, notes = updated_file(place.labels, content)
     write_text(place.labels, text)
     return LabelledClip(place.labels, clip, notes)
+
+
+SOURCES.register(
+    ClipSource("physics101", lambda path: place_of(path) is not None, _load, _label, _files)
+)

@@ -1,15 +1,157 @@
-"""A cell of a sweep: clips, settings, and a name made from their content."""
+"""A cell of a sweep: clips, settings, and a name made from their content.
+
+The files of a clip are found, told apart by their content, and carried to another machine.
+"""
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+import os
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from galileo_jax import __version__
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.clip.load import find_yaml, has_yaml
+from galileo_jax.clip.sources import source_of
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.settings import Settings
 
 NAME_LENGTH = 40  # of the part that is there to be read
+
+
+@dataclass(frozen=True)
+class ClipFiles:
+    """A clip as it lies on disk.
+
+    Attributes:
+      source: the clip as it was named: its video, its yaml, or its track.
+      name: that it goes by.
+      root: a folder above all its files.
+      paths: its files, as far as they are there.
+      digest: of the files' content.
+    """
+
+    source: str
+    name: str
+    root: Path
+    paths: tuple[Path, ...]
+    digest: str
+
+    @classmethod
+    def of(cls, source: str | Path) -> "ClipFiles":
+        """Finds the files of a clip; what is wrong with them is for `load_clip` to say."""
+        source, path = str(source), Path(source)
+        if not has_yaml(path) and (other := source_of(path)):
+            found = other.files(path)
+            digest = _digest([path], found.declared)
+            return cls(source, found.name, found.root, found.paths, digest)
+        found = dict.fromkeys([path, *_beside(path)])
+        paths = tuple(file for file in found if file.is_file())
+        root = Path(os.path.commonpath([file.resolve().parent for file in paths]))
+        return cls(source, path.stem, root, paths, _digest(paths))
+
+    @property
+    def path(self) -> Path:
+        """The file that was named."""
+        return Path(self.source)
+
+    @property
+    def key(self) -> str:
+        """The same for the same content under the same name: a track's messages name its file."""
+        return hashlib.sha256(f"{self.digest} {self.source}".encode()).hexdigest()
+
+    def packed(self) -> "Packed":
+        """The files' content."""
+        below = {path: path.resolve().relative_to(self.root).as_posix() for path in self.paths}
+        content = {name: path.read_bytes() for path, name in below.items()}
+        return Packed(self.source, self.root, below[self.path], content)
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A clip as it travels.
+
+    Attributes:
+      source: where it came from, as it was named.
+      root: the folder that its files were below.
+      name: of the clip's own file among them.
+      content: of the files, by their path below the root.
+    """
+
+    source: str
+    root: Path
+    name: str
+    content: dict[str, bytes]
+
+    @contextmanager
+    def unpacked(self) -> Iterator["Unpacked"]:
+        """The clip in a folder of its own; errors name the path that it came from."""
+        with tempfile.TemporaryDirectory(prefix="galileo.") as folder:
+            for name, content in self.content.items():
+                file = Path(folder) / name
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(content)
+            clip = Path(folder) / self.name
+            origins = {clip.parent: Path(self.source).parent}
+            origins.setdefault(Path(folder), self.root)
+            here = Unpacked(clip, origins)
+            try:
+                yield here
+            except InputError as error:
+                raise InputError(here.text_of_origin(str(error))) from error
+
+
+@dataclass(frozen=True)
+class Unpacked:
+    """A clip in a folder that is not its own.
+
+    Attributes:
+      path: of the clip's file.
+      origins: folders here to the folders they stand for, the innermost first.
+    """
+
+    path: Path
+    origins: Mapping[Path, Path]
+
+    def origin(self, path: Path) -> Path:
+        """Where a file that is here came from."""
+        for here, there in self.origins.items():
+            if path.is_relative_to(here):
+                return there / path.relative_to(here)
+        return path
+
+    def text_of_origin(self, text: str) -> str:
+        """A message with the names of files as they were where they came from."""
+        for here, there in self.origins.items():
+            text = text.replace(f"{here}/", f"{there}/" if there != Path(".") else "")
+            text = text.replace(str(here), str(there))
+        return text
+
+
+def _beside(path: Path) -> list[Path]:
+    """The yaml of a clip, and the video or the tables that it names."""
+    try:
+        yaml = find_yaml(path)
+        content = read_mapping(yaml)
+    except InputError:
+        return []
+    named = [content.get(key) for key in ("video", "track")]
+    objects = content.get("objects")
+    items = objects if isinstance(objects, list) else []
+    named += [item.get("track_file") for item in items if isinstance(item, dict)]
+    return [yaml, *(yaml.parent / name for name in named if isinstance(name, str))]
+
+
+def _digest(paths: list[Path] | tuple[Path, ...], more: str = "") -> str:
+    """Of the files' content, whatever they are called."""
+    digest = hashlib.sha256(more.encode())
+    for path in sorted(paths, key=lambda path: path.suffix):
+        with path.open("rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from galileo_jax.report.sweep_clips import ClipRow
 from galileo_jax.report.sweep_page import labels
-from galileo_jax.sweeping.cell import Cell
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.cell import Cell, ClipFiles
 from galileo_jax.sweeping.settings import Diagnose, Explain
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import Row

@@ -21,12 +21,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.files.package_data import config_path
-from galileo_jax.runtime.errors import InputError
-from galileo_jax.sweeping.settings import Settings, make_settings
+from galileo_jax.runtime.errors import InputError, named
+from galileo_jax.sweeping.settings import Settings, checked, make_settings
 
 ClipName = Annotated[str, Field(strict=True, min_length=1)]
 
@@ -48,6 +49,24 @@ class Simulated(BaseModel):
     effect: Annotated[str, Field(strict=True)] | None = None
     strength: Annotated[float, Field(gt=0, le=1)] | None = None
     video: Annotated[bool, Field(strict=True)] = False
+
+    def made(self, folder: Path) -> list[Path]:
+        """Videos or tracks in a folder, made by `simulate` where they are not there already.
+
+        Raises:
+          InputError: there is no such effect, or it has no place in the scene.
+        """
+        strength = "" if self.strength is None else f"{self.strength:g}"
+        suffix = ".mp4" if self.video else ".csv"
+        effects = (self.effect,) if self.effect else ()
+        paths = []
+        for seed in range(self.seed, self.seed + self.count):
+            path = folder / f"{self.effect or 'none'}{strength}_{seed}{suffix}"
+            paths.append(path)
+            if not all(path.with_suffix(end).is_file() for end in (suffix, ".yaml", ".truth.json")):
+                options = {"track_only": not self.video, "strength": self.strength}
+                simulate(path, seed=seed, effects=effects, **options)
+        return paths
 
 
 class SweepConfig(BaseModel):
@@ -168,22 +187,11 @@ def make_configs(
 
 
 def _checked(name: str, content: dict[str, Any]) -> SweepConfig:
-    try:
-        config = SweepConfig.model_validate(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(
-            str(part) for part in first["loc"] if isinstance(part, int) or part.isidentifier()
-        )
-        known = ", ".join(SweepConfig.model_fields)
-        said = f"unknown; known: {known}" if first["type"] == "extra_forbidden" else first["msg"]
-        raise InputError(f"{name}: {key}: {said}; got {first['input']!r}") from None
-    try:
+    with named(name):
+        config = checked(SweepConfig, content, ", ".join(SweepConfig.model_fields))
         config.all_settings()
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
-    if not config.clips and not config.simulate:
-        raise InputError(f"{name}: clips: missing; files, patterns such as clips/*.yaml expected")
+        if not config.clips and not config.simulate:
+            raise InputError("clips: missing; files, patterns such as clips/*.yaml expected")
     return config
 
 
@@ -222,22 +230,18 @@ def _parsed(option: str, text: str) -> Any:
 
 def _put(content: dict[str, Any], option: str, key: str, value: Any) -> None:
     """Sets the value at a key with dots; numbers are places in a list."""
-    *path, last = key.split(".")
+    parts = key.split(".")
     place: Any = content
-    for i, part in enumerate(path):
-        if isinstance(place, list):
-            place = place[_index(option, place, part)]
-        else:
-            place = place.setdefault(part, {})
+    for i, part in enumerate(parts):
         if not isinstance(place, dict | list):
-            raise InputError(f"{option}: {'.'.join(path[: i + 1])} has no keys below it")
-    if isinstance(place, list):
-        place[_index(option, place, last)] = value
-    else:
-        place[last] = value
-
-
-def _index(option: str, place: list[Any], part: str) -> int:
-    if not part.isdecimal() or int(part) >= len(place):
-        raise InputError(f"{option}: {part}: one of 0 to {len(place) - 1} expected")
-    return int(part)
+            raise InputError(f"{option}: {'.'.join(parts[:i])} has no keys below it")
+        at: Any = part
+        if isinstance(place, list):
+            if not part.isdecimal() or int(part) >= len(place):
+                raise InputError(f"{option}: {part}: one of 0 to {len(place) - 1} expected")
+            at = int(part)
+        elif part not in place:
+            place[part] = {}
+        if i == len(parts) - 1:
+            place[at] = value
+        place = place[at]

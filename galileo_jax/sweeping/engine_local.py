@@ -54,14 +54,14 @@ class EngineLocal:
         again: list[tuple[Task, int]] = []  # tasks whose worker died, and how often
         is_warm = False
         while True:
-            limit = self.num_workers if is_warm else 1
-            for number in range(limit):
-                if self._is_busy(number):
+            for number in range(self.num_workers if is_warm else 1):
+                worker = self._workers.get(number)
+                if worker is not None and worker.task is not None:
                     continue
                 task, tries = again.pop() if again else (next(waiting, None), 0)
                 if task is None:
                     break
-                self._worker(number).give(task, tries)
+                self._worker(number).give(task, tries + 1)
             busy = {w.connection: w for w in self._workers.values() if w.task is not None}
             if not busy:
                 return
@@ -69,23 +69,22 @@ class EngineLocal:
                 worker = busy[connection]  # pyright: ignore[reportArgumentType]
                 outcome = worker.take()
                 if outcome is None:
-                    lost, tries = worker.lost()
+                    assert worker.task is not None
                     del self._workers[worker.number]
-                    if tries < MAX_TRIES:
-                        again.append((lost, tries))
+                    if worker.tries < MAX_TRIES:
+                        again.append((worker.task, worker.tries))
                         continue
-                    outcome = died(lost, f"its worker died ({worker.ending()})")
+                    outcome = died(worker.task, f"its worker died ({worker.ending()})")
                 is_warm = True
                 yield outcome
 
     def close(self) -> None:
         """Ends the workers."""
         for worker in self._workers.values():
-            worker.end()
+            worker.process.kill()
+            worker.process.join()
+            worker.connection.close()
         self._workers.clear()
-
-    def _is_busy(self, number: int) -> bool:
-        return number in self._workers and self._workers[number].task is not None
 
     def _worker(self, number: int) -> "_Worker":
         if number not in self._workers:
@@ -100,15 +99,15 @@ class _Worker:
         context = multiprocessing.get_context("spawn")  # JAX's threads do not survive a fork
         self.number = number
         self.task: Task | None = None
-        self._tries = 0
+        self.tries = 0
         self.connection, far = context.Pipe()
-        self._process = context.Process(target=_serve, args=(far, dict(environment)), daemon=True)
-        self._process.start()
+        self.process = context.Process(target=_serve, args=(far, dict(environment)), daemon=True)
+        self.process.start()
         far.close()
 
     def give(self, task: Task, tries: int) -> None:
-        """Gives it a task, after `tries` deaths of others."""
-        self.task, self._tries = task, tries
+        """Gives it a task that so many workers have begun, itself among them."""
+        self.task, self.tries = task, tries
         with suppress(BrokenPipeError, ConnectionResetError):  # `take` will say that it died idle
             self.connection.send(task)
 
@@ -117,26 +116,15 @@ class _Worker:
         try:
             outcome: Outcome = self.connection.recv()
         except (EOFError, ConnectionResetError):
-            self._process.join()
+            self.process.join()
             return None
         self.task = None
         return outcome
 
-    def lost(self) -> tuple[Task, int]:
-        """The task it died of, and how many workers have by now."""
-        assert self.task is not None
-        return self.task, self._tries + 1
-
     def ending(self) -> str:
         """How it ended, in words."""
-        code = self._process.exitcode or 0
+        code = self.process.exitcode or 0
         return f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
-
-    def end(self) -> None:
-        """Ends it at once."""
-        self._process.kill()
-        self._process.join()
-        self.connection.close()
 
 
 def _serve(connection: Connection, environment: dict[str, str]) -> None:

@@ -57,17 +57,15 @@ class EngineRay:
                 return
             done, _ = self._ray.wait(list(running), timeout=LOOK_S)
             for reference in done:
-                yield self._outcome(reference, running.pop(reference))
+                task = running.pop(reference)
+                try:
+                    yield self._ray.get(reference)
+                except self._ray.exceptions.RayError as error:
+                    yield died(task, f"its worker died ({type(error).__name__})")
 
     def close(self) -> None:
         """Leaves the cluster, whose workers drop what they are doing."""
         self._ray.shutdown()
-
-    def _outcome(self, reference: Any, task: Task) -> Outcome:
-        try:
-            return self._ray.get(reference)
-        except self._ray.exceptions.RayError as error:
-            return died(task, f"its worker died ({type(error).__name__})")
 
     def _num_slots(self) -> int:
         there = self._ray.cluster_resources()

@@ -74,7 +74,11 @@ class Computing:
         if self.together is not None:
             return self.together
         is_free = self.engine == "local" and self.workers is None and not self.gpus_per_worker
-        return num_together() if is_free else 1
+        if not is_free or not local_gpus():
+            return 1
+        import jax
+
+        return NUM_TOGETHER if jax.default_backend() != "cpu" else 1
 
 
 LEAST = {"workers": 0, "cpus_per_worker": 1, "gpus_per_worker": 0, "together": 1}
@@ -88,15 +92,6 @@ def num_workers(each: Resources) -> int:
     if each.gpus:
         room = min(room, len(local_gpus()) // each.gpus)
     return max(room, 1)
-
-
-def num_together() -> int:
-    """How many cells one process computes together: 1 on a CPU, many on an accelerator."""
-    if not local_gpus():
-        return 1
-    import jax
-
-    return NUM_TOGETHER if jax.default_backend() != "cpu" else 1
 
 
 def local_gpus() -> list[str]:

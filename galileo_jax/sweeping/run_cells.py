@@ -4,8 +4,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 from galileo_jax.runtime import progress
-from galileo_jax.sweeping.cell import Cell
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.cell import Cell, ClipFiles
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.task import Engine, Failure, Outcome, Task
 from galileo_jax.sweeping.work import measure_files, run_cell

@@ -1,15 +1,8 @@
 """What a cell does with its clips: a method and its options, typed and checked."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    TypeAdapter,
-    ValidationError,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from galileo_jax.clip.fields import wrong
 from galileo_jax.runtime.errors import InputError
@@ -94,16 +87,28 @@ class Explain(_Settings):
     method: Literal["explain"]
 
 
-KINDS: dict[str, type[_Settings]] = {
-    "grad": Grad,
-    "mh": Mh,
-    "cnn": Cnn,
-    "thesis": Thesis,
-    "diagnose": Diagnose,
-    "explain": Explain,
-}
 Settings = Grad | Mh | Cnn | Thesis | Diagnose | Explain
-_ADAPTER: TypeAdapter[Settings] = TypeAdapter(Annotated[Settings, Field(discriminator="method")])
+KINDS: dict[str, type[Settings]] = {
+    get_args(kind.model_fields["method"].annotation)[0]: kind for kind in get_args(Settings)
+}
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def checked(kind: type[Model], content: dict[str, Any], known: str = "") -> Model:
+    """A model of `content`; `known` is what there is in place of an unknown key.
+
+    Raises:
+      InputError: a value is wrong; the message begins with its key, with dots.
+    """
+    try:
+        return kind.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        parts = (p for p in first["loc"] if isinstance(p, int) or p.isidentifier())
+        is_unknown = first["type"] == "extra_forbidden"
+        said = f"unknown; known: {known}" if is_unknown else first["msg"]
+        key = ".".join(map(str, parts))
+        raise InputError(f"{key}: {said}; got {first['input']!r}") from None
 
 
 def make_settings(content: dict[str, Any]) -> Settings:
@@ -126,9 +131,4 @@ def make_settings(content: dict[str, Any]) -> Settings:
                 f"{key}: method {method} has no such option{whose}; "
                 f"it has: {', '.join(name for name in known if name != 'method')}"
             )
-    try:
-        return _ADAPTER.validate_python(content)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"][1:]))
-        raise InputError(f"{key}: {first['msg']}; got {first['input']!r}") from None
+    return checked(KINDS[method], content)

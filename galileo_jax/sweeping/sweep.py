@@ -1,9 +1,10 @@
 """`sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,14 +20,12 @@ from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.sweeping.agreement import agreements, with_remarks
-from galileo_jax.sweeping.cell import Cell, make_cells
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.cell import Cell, ClipFiles, make_cells
 from galileo_jax.sweeping.clip_rows import make_clip_rows, names_of
 from galileo_jax.sweeping.config import SweepConfig, make_configs, read_config
 from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
 from galileo_jax.sweeping.resources import Computing, num_workers
 from galileo_jax.sweeping.run_cells import COMPUTED, Report, carry_out
-from galileo_jax.sweeping.simulated import simulated_clips
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import Row, columns_of, make_rows, write_tables
 from galileo_jax.sweeping.task import Engine
@@ -192,7 +191,7 @@ def sweep(
             store.forget_failure(cell.name)
         done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
-        with _engine(computing) as worker:
+        with closing(_engine(computing)) as worker:
             carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
         report("writing the page", COMPUTED, None)
         made = _written(name, cells, store, command)
@@ -258,18 +257,13 @@ def _cells(
       the cells, the names of those that get a page, and of those that have a result and no page
       though the config asks for one.
     """
-    files: dict[str, ClipFiles] = {}
-
-    def of(source: str) -> ClipFiles:
-        if source not in files:
-            files[source] = ClipFiles.of(source)
-        return files[source]
-
+    of = cache(ClipFiles.of)
     cells: dict[str, Cell] = {}
     reports: dict[str, bool | None] = {}
     for config, named in zip(configs, groups, strict=True):
-        made = simulated_clips(store.folder / "simulated", config.simulate)
-        together = [*named, *((str(path),) for path in made)]
+        folder = store.folder / "simulated"
+        made = [(str(path),) for one in config.simulate for path in one.made(folder)]
+        together = [*named, *made]
         found = make_cells([tuple(map(of, group)) for group in together], config.all_settings())
         cells |= {cell.name: cell for cell in found}
         reports |= {cell.name: config.reports for cell in found}
@@ -283,22 +277,16 @@ def _cells(
     return tuple(cells.values()), with_page, again
 
 
-@contextmanager
-def _engine(computing: Computing) -> Iterator[Engine]:
+def _engine(computing: Computing) -> Engine:
     each = computing.each
     if computing.engine == "ray":
         from galileo_jax.sweeping.engine_ray import EngineRay
 
-        engine = EngineRay(computing.address, each)
-    elif (together := computing.num_together()) > 1:
+        return EngineRay(computing.address, each)
+    if (together := computing.num_together()) > 1:
         from galileo_jax.sweeping.engine_together import EngineTogether
 
-        engine = EngineTogether(together)
-    elif computing.workers == 0:
-        engine = EngineHere()
-    else:
-        engine = EngineLocal(computing.workers or num_workers(each), each)
-    try:
-        yield engine
-    finally:
-        engine.close()
+        return EngineTogether(together)
+    if computing.workers == 0:
+        return EngineHere()
+    return EngineLocal(computing.workers or num_workers(each), each)

@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import Cancelled
@@ -49,7 +49,6 @@ class Outcome:
     failure: Failure | None = None
 
 
-@runtime_checkable
 class Engine(Protocol):
     """Something that carries out tasks."""
 
@@ -72,17 +71,14 @@ def attempt(task: Task) -> Outcome:
         return Outcome(task.key, task.function(*task.arguments))
     except Cancelled:
         raise
-    except InputError as error:
-        return Outcome(task.key, failure=Failure("input", _one_line(error)))
     except Exception as error:
-        line = f"{type(error).__name__}: {_one_line(error)}"
-        return Outcome(task.key, failure=Failure("bug", line, traceback.format_exc()))
+        line = " ".join(str(error).split())
+        if isinstance(error, InputError):
+            return Outcome(task.key, failure=Failure("input", line))
+        line, details = f"{type(error).__name__}: {line}", traceback.format_exc()
+        return Outcome(task.key, failure=Failure("bug", line, details))
 
 
 def died(task: Task, cause: str) -> Outcome:
     """The outcome of a task that no worker survived."""
     return Outcome(task.key, failure=Failure("died", f"{cause}, {MAX_TRIES} times"))
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

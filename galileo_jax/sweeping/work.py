@@ -11,7 +11,7 @@ from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.report.sweep_clips import thumbnail
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.sweeping.clip_files import Packed
+from galileo_jax.sweeping.cell import Packed
 from galileo_jax.sweeping.settings import Diagnose, Explain, Settings, Thesis
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import yaml
 
 import galileo_jax.physics101  # noqa: F401  # a source of clips
 from galileo_jax.api.simulate import simulate
+from galileo_jax.clip.checks import check_same_objects
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.same_objects import check_same_objects
 from galileo_jax.commands import command, label
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import good_video

@@ -14,8 +14,7 @@ from galileo_jax.commands import command, simulate
 from galileo_jax.commands import sweep as sweep_command
 from galileo_jax.sweeping import run_cells
 from galileo_jax.sweeping.agreement import agreements, with_remarks
-from galileo_jax.sweeping.cell import make_cells
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.cell import ClipFiles, make_cells
 from galileo_jax.sweeping.settings import make_settings
 from galileo_jax.sweeping.sweep import sweep
 from tests.precision import in_64_bit

@@ -11,8 +11,7 @@ from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.measurement.segments.track_failure import Astray
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.sweeping.cell import Cell, make_cells
-from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.cell import Cell, ClipFiles, make_cells
 from galileo_jax.sweeping.settings import Grad
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.task import Failure
