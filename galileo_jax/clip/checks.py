@@ -23,61 +23,49 @@ INTO_WALL = 0.25
 def check_objects(file: ClipFile, fail: Any) -> None:
     """What takes several values of the yaml to judge."""
     scenario = SCENARIOS[file.scenario]
-    is_given = scenario.angle_deg is not None
-    if scenario.has_ramp and not is_given and "ramp_angle_deg" not in file.model_fields_set:
+    this = f"scenario {file.scenario} ({scenario.meaning})"
+    has_ramp = scenario.has_ramp and scenario.angle_deg is None
+    fewest, most = scenario.num_objects
+    if has_ramp and "ramp_angle_deg" not in file.model_fields_set:
         fail(
             "ramp_angle_deg",
             f"missing; scenario {file.scenario} needs it, in degrees, or null where it is to be "
             "found from the path",
         )
-    is_alone = scenario.num_objects[1] == 1  # several objects may slide beside a ramp
-    if is_alone and (is_given or not scenario.has_ramp) and file.ramp_angle_deg is not None:
-        fail(
-            "ramp_angle_deg",
-            f"{file.ramp_angle_deg:g} given; scenario {file.scenario} ({scenario.meaning}) has no "
-            "ramp; leave it out",
-        )
+    # Several objects may slide beside a ramp.
+    if most == 1 and not has_ramp and (angle := file.ramp_angle_deg) is not None:
+        fail("ramp_angle_deg", f"{angle:g} given; {this} has no ramp; leave it out")
     for key in (key for other in SCENARIOS.values() for key in other.keys):
         is_given = getattr(file, key) != ClipFile.model_fields[key].default
         if is_given and key not in scenario.keys:
             where = ", ".join(name for name, other in SCENARIOS.items() if key in other.keys)
             fail(key, f"means nothing in scenario {file.scenario}, only in {where}; leave it out")
-    fewest, most = scenario.num_objects
     count = len(file.objects)
     if count < fewest:
         fail("objects", "empty; at least one object expected")
     if most is not None and count > most:
-        fail(
-            "objects",
-            f"{count} objects; scenario {file.scenario} ({scenario.meaning}) "
-            f"has at most {most}; did you mean scenario: multi?",
-        )
+        multi = "did you mean scenario: multi?"
+        fail("objects", f"{count} objects; {this} has at most {most}; {multi}")
     names: dict[str, int] = {}
     for index, item in enumerate(file.objects):
+        key = f"objects[{index}]"
         if item.name in names:
-            fail(
-                f"objects[{index}].name",
-                f"{item.name!r} is also the name of objects[{names[item.name]}]; names must differ",
-            )
+            first = f"objects[{names[item.name]}]"
+            fail(f"{key}.name", f"{item.name!r} is also the name of {first}; names must differ")
         names[item.name] = index
         if item.rolls is not None:
-            _check_rolls(f"objects[{index}].rolls", item, file.scenario, fail)
+            _check_rolls(f"{key}.rolls", item, file.scenario, fail)
         if scenario.is_level and item.shape != "cylinder":
-            fail(f"objects[{index}].shape", f"{item.shape}; a puck is a cylinder, seen from above")
+            fail(f"{key}.shape", f"{item.shape}; a puck is a cylinder, seen from above")
         if item.size_m is None:
             continue
-        meaning = SIZE_MEANING[item.shape]
-        if len(item.size_m) != meaning.count(",") + 1:
-            fail(
-                f"objects[{index}].size_m",
-                f"{list(item.size_m)} has {len(item.size_m)} values; "
-                f"a {item.shape} has {meaning}, in metres",
-            )
-        if item.shape == "torus" and item.size_m[1] >= item.size_m[0]:
-            fail(
-                f"objects[{index}].size_m",
-                f"{list(item.size_m)}: the tube is thicker than the ring; {meaning} expected",
-            )
+        size, meaning = list(item.size_m), SIZE_MEANING[item.shape]
+        if len(size) != meaning.count(",") + 1:
+            has = f"has {len(size)} values; a {item.shape} has {meaning}, in metres"
+            fail(f"{key}.size_m", f"{size} {has}")
+        if item.shape == "torus" and size[1] >= size[0]:
+            wrong = f"the tube is thicker than the ring; {meaning} expected"
+            fail(f"{key}.size_m", f"{size}: {wrong}")
 
 
 def _check_rolls(key: str, item: ClipObject, scenario: str, fail: Any) -> None:
@@ -108,10 +96,8 @@ def check_against_source(clip: Clip, observation: Observation | None, fail: Any)
         # The foot may lie outside the picture, but not by more than its own size.
         _check_in_frame("origin_px", clip.origin_px, clip.frame_size_px, 1, fail)
     check_walls(clip, observation, fail)
-    centres_m = (
-        _first_positions(observation) if observation else placement.centres_from_pixels(clip)
-    )
-    for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, centres_m)):
+    places = _first_positions(observation) if observation else placement.centres_from_pixels(clip)
+    for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, places)):
         if problem:
             fail(*problem)
 
@@ -195,12 +181,8 @@ def _check_in_frame(
     key: str, point: tuple[float, float], size_px: tuple[int, int], margin: int, fail: Any
 ) -> None:
     width, height = size_px
-    x, y = point
-    is_inside = (
-        -margin * width <= x < (1 + margin) * width
-        and -margin * height <= y < (1 + margin) * height
-    )
-    if not is_inside:
+    sides = zip(point, size_px, strict=True)
+    if not all(-margin * size <= at < (1 + margin) * size for at, size in sides):
         far = "far " if margin else ""
         fail(key, f"{list(point)} is {far}outside the frame of {width} x {height} pixels")
 

@@ -1,6 +1,7 @@
 """Loading a clip: every problem is one line that names the file, the key and the remedy."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -64,16 +65,12 @@ def with_unused(clip: Clip) -> Clip:
     """The clip with a warning for every key that means nothing beside its track."""
     if clip.track is None:
         return clip
-    unused = {
-        f"objects[{index}].point_px": "the track says where it is"
-        for index, item in enumerate(clip.objects)
-        if item.point_px is not None
-    }
-    unused |= {
-        f"objects[{index}].corrections": "a track is not tracked again"
-        for index, item in enumerate(clip.objects)
-        if item.corrections
-    }
+    unused = {}
+    for index, item in enumerate(clip.objects):
+        if item.point_px is not None:
+            unused[f"objects[{index}].point_px"] = "the track says where it is"
+        if item.corrections:
+            unused[f"objects[{index}].corrections"] = "a track is not tracked again"
     if clip.origin_px is not None and clip.track_units != "px":
         unused["origin_px"] = "the track is in units of length" + (
             ", from the foot of the ramp on" if clip.is_own_track else "; track_origin is the foot"
@@ -100,9 +97,7 @@ def with_corrections(clip: Clip, correct: Mapping[str, Sequence[Sequence[float]]
         for item in clip.objects
     ]
 
-    def fail(key: str, problem: str) -> NoReturn:
-        raise InputError(f"{clip.path}: {key} (given in the call): {problem}")
-
+    fail = _failing(clip.path, frozenset({"objects"}))
     try:
         found = Clip.model_validate({**dict(clip), "objects": objects})
     except ValidationError as error:
@@ -110,6 +105,16 @@ def with_corrections(clip: Clip, correct: Mapping[str, Sequence[Sequence[float]]
     for index, item in enumerate(found.objects):
         check_frames(f"objects[{index}]", item, found, fail)
     return found
+
+
+def _failing(path: Path, overridden: frozenset[str]) -> Callable[[str, str], NoReturn]:
+    """What refuses the value of a key; of those that do not stand in the file it says so."""
+
+    def fail(key: str, problem: str) -> NoReturn:
+        note = " (given in the call)" if re.split(r"[.\[]", key)[0] in overridden else ""
+        raise InputError(f"{path}: {key}{note}: {problem}")
+
+    return fail
 
 
 def yaml_of(path: Path) -> Path:
@@ -163,13 +168,12 @@ def check_clip(
     """
     path = Path(path)
 
-    def fail(key: str, problem: str) -> NoReturn:
-        note = " (given in the call)" if key.split(".")[0].split("[")[0] in overridden else ""
-        raise InputError(f"{path}: {key}{note}: {problem}")
-
+    fail = _failing(path, overridden)
     content = dict(content)
     if (content.get("video") is None) == (content.get("track") is None):
-        _fail_for_unknown_key(content, fail)
+        for key in content:
+            if key not in ClipFile.model_fields:
+                fail(short(key).strip("'"), unknown_key(key, ClipFile))
         problem = "both given" if content.get("video") is not None else "missing"
         fail("video, track", f"{problem}; one of them expected, such as video: {path.stem}.mp4")
 
@@ -195,12 +199,6 @@ def check_clip(
         clip = clip.model_copy(update={"pixels_per_metre": scale_of_rectangle(clip)})
     check_against_source(clip, read.observation if read else None, fail)
     return clip
-
-
-def _fail_for_unknown_key(content: Mapping[str, Any], fail: Any) -> None:
-    for key in content:
-        if key not in ClipFile.model_fields:
-            fail(short(key).strip("'"), unknown_key(key, ClipFile))
 
 
 def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:

@@ -48,18 +48,12 @@ def with_lost_frames(times: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 def lost_text(path: Path, times: np.ndarray, restored: np.ndarray) -> tuple[str, ...]:
-    """Which frames were lost, a line; nothing where none were.
-
-    Args:
-      path: named in what is said.
-      times: `[row]`, s.
-      restored: the same `with_lost_frames`.
-    """
+    """Which frames were lost, a line, by times `[row]`, s, before and after; nothing: none were."""
     lost = np.round((np.diff(restored) - np.diff(times)) / np.median(np.diff(times))).astype(int)
     if not lost.any():
         return ()
     after = np.flatnonzero(lost)
-    listed = [f"{row}" + (f" ({lost[row]})" if lost[row] > 1 else "") for row in after]
+    listed = [f"{row} ({lost[row]})" if lost[row] > 1 else f"{row}" for row in after]
     return (
         f"{path}: frames are missing after rows {', '.join(listed)}, counted from 0, where it "
         "jumps by whole steps; their time is put back",

@@ -27,9 +27,21 @@ TOLERANCE_PER_SIZE = 0.125
 TOLERANCE_PER_DISTANCE = 0.06
 """Error of height per metre from the foot: a declared angle that is off by 3.4 degrees."""
 
-MEND_PIXELS = "correct point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
-MEND_LENGTHS = "correct track_origin, ramp_angle_deg, direction, size_m or track_units"
-MEND_OWN_CSV = "correct ramp_angle_deg, size_m or the csv (x along, y up, from the foot)"
+MEND = {
+    "pixels": (
+        "correct point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre",
+        "correct point_px, size_m or pixels_per_metre",
+    ),
+    "lengths": (
+        "correct track_origin, ramp_angle_deg, direction, size_m or track_units",
+        "correct size_m or track_units",
+    ),
+    "own csv": (
+        "correct ramp_angle_deg, size_m or the csv (x along, y up, from the foot)",
+        "correct size_m or the csv's columns",
+    ),
+}
+"""What may be wrong where an object cannot stand, and where two reach into each other."""
 
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""
@@ -101,24 +113,17 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     scenario = SCENARIOS[clip.scenario]
     is_on_ramp = scenario.has_ramp and scenario.angle_deg is None and has_origin
     is_on_ramp &= clip.ramp_angle_deg is not None
-    if clip.is_own_track:
-        mend, mend_pair = MEND_OWN_CSV, "correct size_m or the csv's columns"
-    elif in_pixels:
-        mend, mend_pair = MEND_PIXELS, "correct point_px, size_m or pixels_per_metre"
-    else:
-        mend, mend_pair = MEND_LENGTHS, "correct size_m or track_units"
+    mend, mend_pair = MEND["own csv" if clip.is_own_track else "pixels" if in_pixels else "lengths"]
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     placed = [
         (index, item, _outline(item, centres_m[item.name], angle if is_on_ramp else 0.0))
         for index, item in enumerate(clip.objects)
         if item.size_m is not None and item.name in centres_m
     ]
-    if is_on_ramp:
-        has_table = scenario.has_table
-        for index, _, outline in placed:
-            problem = _against_surfaces(outline, angle, has_table, pixel_m)
-            if problem:
-                return f"objects[{index}] ({outline.name})", f"{problem}; {mend}"
+    for index, _, outline in placed if is_on_ramp else ():
+        problem = _against_surfaces(outline, angle, scenario.has_table, pixel_m)
+        if problem:
+            return f"objects[{index}] ({outline.name})", f"{problem}; {mend}"
     for (_, first, a), (index, second, b) in itertools.combinations(placed, 2):
         if first.first_frame != second.first_frame:
             continue

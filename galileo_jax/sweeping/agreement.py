@@ -49,8 +49,7 @@ def with_remarks(
     for i in first:
         row = rows[i]
         outside = {one.quantity: text for one in found if (text := _outside(one, names[i]))}
-        reasons = [*outside.values(), row["remark"]]
-        reasons.append(_of_verdict(row, usual))
+        reasons = [*outside.values(), row["remark"], _of_verdict(row, usual)]
         if any(reasons) or row["status"] == "failed":
             reasons += _other_declared(declared[i], [declared[j] for j in first if j != i])
         said = "; ".join(filter(None, reasons)) or None
@@ -61,11 +60,8 @@ def with_remarks(
 def _first(rows: Sequence[Row]) -> list[int]:
     """The row of each group: the first that is done, else the first."""
     chosen: dict[str, int] = {}
-    for i, row in enumerate(rows):
-        if row["clips"] not in chosen or (
-            row["status"] == "done" != rows[chosen[row["clips"]]]["status"]
-        ):
-            chosen[row["clips"]] = i
+    for i in sorted(range(len(rows)), key=lambda i: rows[i]["status"] != "done"):
+        chosen.setdefault(rows[i]["clips"], i)
     return sorted(chosen.values())
 
 

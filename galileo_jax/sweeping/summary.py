@@ -6,6 +6,7 @@ taken up again ends with the same table, to the last digit.
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -37,14 +38,8 @@ def make_rows(cells: Iterable[Cell], store: Store) -> list[Row]:
 
     What a motion determines beside `QUANTITIES` (g, a stiffness, ...) follows with such keys.
     """
-    truths: dict[Path, dict[str, Any]] = {}
-    rows = []
-    for cell in cells:
-        path = cell.clips[0].path
-        if path not in truths:
-            truths[path] = read_truth(path)
-        rows.append(_row(cell, store, truths[path]))
-    return rows
+    truth_of = cache(read_truth)
+    return [_row(cell, store, truth_of(cell.clips[0].path)) for cell in cells]
 
 
 def read_truth(clip: Path) -> dict[str, Any]:

@@ -29,11 +29,10 @@ def motion_starts(clock: np.ndarray) -> tuple[int, ...]:
     """
     starts = [0, *(1 + np.flatnonzero(np.diff(clock) < 0)).tolist()]
     ends = [*starts[1:], len(clock)]
-    is_whole = all(end - start >= LEAST_ROWS for start, end in zip(starts, ends, strict=True))
-    step = float(np.median(np.abs(np.diff(clock)))) if len(clock) > 1 else 0.0
-    if not is_whole:
-        return (0,)
     begin = np.array(starts)
+    if (np.array(ends) - begin < LEAST_ROWS).any():
+        return (0,)
+    step = float(np.median(np.abs(np.diff(clock))))
     is_back = np.abs(clock[begin] - clock[0]) <= step
     goes_on = clock[begin + 1] - clock[begin] <= MOST_STEPS * step
     return tuple(starts) if is_back.all() and goes_on.all() else (0,)
@@ -78,15 +77,14 @@ def without_repeats(
     """
     if times.size < 2 or not (np.diff(times) == 0).any():
         return times, places, []
-    group = np.concatenate([[0], np.cumsum(np.diff(times) != 0)])
-    count = int(group[-1]) + 1
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(times) != 0]))
+    is_first = np.concatenate([[True], np.diff(times) != 0])
+    group, starts = np.cumsum(is_first) - 1, np.flatnonzero(is_first)
     seen = np.isfinite(places)
     total = np.add.reduceat(np.where(seen, places, 0.0), starts, axis=-1)
     number = np.add.reduceat(seen, starts, axis=-1)
     mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
     differs = seen & (places != mean[..., group])
-    repeats = np.bincount(group, minlength=count) > 1
+    repeats = np.bincount(group) > 1
     num_mixed = int(np.unique(group[differs.any(axis=(0, 1))]).size)
     first = lines[int(starts[int(repeats.argmax())])]
     how = (

@@ -130,26 +130,15 @@ def _calibration(panel: ElementTree.Element) -> tuple[Calibration | None, tuple[
     unit = LENGTHS.get((_text(panel, "length_unit") or "").strip().lower())
     turned_deg = (angle_deg + 45) % 90 - 45
     is_level = abs(turned_deg) <= MAX_ROLL_DEG
-    warnings = ()
-    if abs(angle_deg) > 0.01:
-        taken = (
-            f"a camera that leans by {turned_deg:.2f} degrees"
-            if is_level
-            else "laid along a slope: the picture's own vertical is used"
-        )
-        warnings = (f"its axes are turned by {angle_deg:.2f} degrees; interpreted as {taken}",)
-    is_calibrated = scales != [1.0, 1.0]
-    if not is_calibrated:
+    taken = "laid along a slope: the picture's own vertical is used"
+    if is_level:
+        taken = f"a camera that leans by {turned_deg:.2f} degrees"
+    said = f"its axes are turned by {angle_deg:.2f} degrees; interpreted as {taken}"
+    if scales == [1.0, 1.0]:  # never calibrated
         scales, unit = [math.nan, math.nan], None
-    return (
-        Calibration(
-            pixels_per_unit=(scales[0], scales[1]),
-            unit=unit,
-            origin_px=(x, y),
-            roll_rad=math.radians(turned_deg) if is_level else 0.0,
-        ),
-        warnings,
-    )
+    roll_rad = math.radians(turned_deg) if is_level else 0.0
+    found = Calibration((scales[0], scales[1]), unit, (x, y), roll_rad)
+    return found, (said,) if abs(angle_deg) > 0.01 else ()
 
 
 def _frame_s(panel: ElementTree.Element) -> float | None:
