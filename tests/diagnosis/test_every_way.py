@@ -14,21 +14,19 @@ from tests.diagnosis.test_rank_formulas import FACTOR, RANGES, TIMES, made, sigh
 
 
 @pytest.fixture
-def views(monkeypatch) -> Any:
+def sights(monkeypatch) -> Any:
     """One clip in which object 1 is pushed on over a bump."""
     away = (TIMES - 0.5) / 0.1
     seen = sight(3.0 * away * np.exp(-(away**2)))
-    monkeypatch.setattr(rank_formulas.Sight, "of", lambda view: seen)
-    monkeypatch.setattr(rank_formulas, "ranges_of", lambda views: RANGES)
-    surroundings = SimpleNamespace(has_surface=True, names=("object1", "object2"))
-    return [
-        SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings)))
-    ]
+    monkeypatch.setattr(rank_formulas, "ranges_of", lambda sights: RANGES)
+    scene: Any = seen.view.model.scene.surroundings
+    scene.has_surface, scene.names = True, ("object1", "object2")
+    return [seen]
 
 
-def test_a_family_has_more_ways_than_are_screened(views):
+def test_a_family_has_more_ways_than_are_screened(sights):
     family = Structure("push", False, (FACTOR["slope_q"],)).family
-    found = of_family(views, family)
+    found = of_family(sights, family)
     ways = {(one.structure.nature, one.structure.is_on_all) for one in found}
     assert {("push", False), ("friction", False)} <= ways and len(ways) > NUM_OF_FAMILY
     assert {one.structure.family for one in found} == {family}
@@ -41,7 +39,7 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
     family = [made("slope_q", 90.0 - i, *way) for i, way in enumerate(ways)]
     evidence = {"push": 285.0, "friction": 275.0}
 
-    def fitted(trials, near, found, views):
+    def fitted(trials, near, found, sights):
         return [
             SimpleNamespace(
                 structure=one.structure,
@@ -53,8 +51,8 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
             for one in found
         ]
 
-    monkeypatch.setattr(fit_formulas, "suggestions", lambda views, wanted: family[:2])
-    monkeypatch.setattr(fit_formulas, "of_family", lambda views, name: family)
+    monkeypatch.setattr(fit_formulas, "suggestions", lambda sights, wanted: family[:2])
+    monkeypatch.setattr(fit_formulas, "of_family", lambda sights, name: family)
     monkeypatch.setattr(fit_formulas, "_fitted", fitted)
     monkeypatch.setattr(fit_formulas, "without_twins", lambda laws: laws)
     none: Any = None

@@ -16,7 +16,7 @@ from galileo_jax.diagnosis.laws.grammar import (
     name_of,
     without_one_factor,
 )
-from galileo_jax.diagnosis.laws.linearised_clip import accelerations, masses_and_frictions
+from galileo_jax.diagnosis.laws.linearised_clip import Sight
 from galileo_jax.diagnosis.laws.rank_formulas import (
     NUM_LAWS,
     Shape,
@@ -102,15 +102,16 @@ def fitted_laws(
     `near` has no effects, all else from where fits start; `wanted` is tried whatever the screening
     says of it.
     """
-    found = suggestions(views, wanted)
+    sights = [Sight.of(view) for view in views]
+    found = suggestions(sights, wanted)
     on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
-    made = _fitted(trials, near, found, views)
+    made = _fitted(trials, near, found, sights)
     known = {name_of(law.structure) for law in made}
     if made:
-        others = [*_simpler(made[0]), *of_family(views, made[0].structure.family)]
+        others = [*_simpler(made[0]), *of_family(sights, made[0].structure.family)]
         new = [one for one in others if name_of(one.structure) not in known]
         on_stage(f"looking for a law: fitting the best formula in {len(new[:NUM_LAWS])} other ways")
-        made += _fitted(trials, near, new[:NUM_LAWS], views)
+        made += _fitted(trials, near, new[:NUM_LAWS], sights)
     return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
 
 
@@ -154,12 +155,12 @@ def _fitted(
     trials: JointProblem,
     near: Hypothesis,
     found: Sequence[Suggestion],
-    views: Sequence[View],
+    sights: Sequence[Sight],
 ) -> list[FittedLaw]:
     """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
         return []
-    ranges = ranges_of(views)
+    ranges = ranges_of(sights)
     sources = [class_source(one.structure, ranges) for one in found]
     extended = _with_laws(trials, [one.structure for one in found], sources)
     fitter, count = GradientFitter(extended), len(extended.model_parameters)
@@ -171,7 +172,7 @@ def _fitted(
     starts, free, owner = [], [], []
     for i, one in enumerate(found):
         is_free = extended.free([name_of(one.structure)])[:count]
-        for start in _starts(extended, z, one, views):
+        for start in _starts(extended, z, one, sights):
             starts.append(np.where(is_free, start[:count], 0.0))
             free.append(is_free)
             owner.append(i)
@@ -208,12 +209,12 @@ def _with_laws(
 
 
 def _starts(
-    extended: JointProblem, z: np.ndarray, one: Suggestion, views: Sequence[View]
+    extended: JointProblem, z: np.ndarray, one: Suggestion, sights: Sequence[Sight]
 ) -> list[np.ndarray]:
     """Starts in z: constants of the screening; all else as given, or as goes with it."""
     name, found = name_of(one.structure), []
     for constants in one.starts:
-        for others in (z, _with_formula(extended, z, one.structure, constants, views)):
+        for others in (z, _with_formula(extended, z, one.structure, constants, sights)):
             start, values = others.copy(), dict(constants)
             if one.structure.nature == "friction":
                 theta = dict(zip(extended.names, extended.theta(start), strict=True))
@@ -232,14 +233,15 @@ def _with_formula(
     z: np.ndarray,
     structure: Structure,
     constants: Mapping[str, float],
-    views: Sequence[View],
+    sights: Sequence[Sight],
 ) -> np.ndarray:
     """All else where a linear model has it if the formula is there."""
     total, count = np.zeros(len(z)), np.zeros(len(z))
-    for clip, view in enumerate(views):
+    for clip, sight in enumerate(sights):
+        view = sight.view
         others = view.others()
         grid = {key: np.array([constants[key]]) for key in structure.constants}
-        curves = accelerations(view, structure, grid, masses_and_frictions(view)[0])
+        curves = sight.accelerations(structure, grid)
         left = view.target()
         for i, (curve,) in enumerate(curves):
             left = left - view.shows(i)[:, view.moves[i]] @ (constants["c"] * curve[view.moves[i]])

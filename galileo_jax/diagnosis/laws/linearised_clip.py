@@ -20,8 +20,8 @@ class Sight:
       view: the clip's.
       target: `[value]`.
       responses: of each object `[value, time]`.
-      masses: of the objects, kg.
-      frictions: their coefficients.
+      masses: of the objects, kg, as fitted; 0 of those without.
+      frictions: their coefficients, likewise.
     """
 
     view: View
@@ -45,7 +45,13 @@ class Sight:
                     :, view.moves[i]
                 ]
             responses.append(shown)
-        masses, frictions = masses_and_frictions(view)
+        named = view.model.by_name(
+            view.trials.of_clip(view.trials.theta(view.fit.z, view.fit.free), 0)
+        )
+        masses, frictions = (
+            np.array([float(named.get(f"{kind}{i + 1}", 0.0)) for i in range(len(view.path_m))])
+            for kind in "mk"
+        )
         return cls(view, white, tuple(responses), masses, frictions)
 
     def is_possible(
@@ -58,54 +64,40 @@ class Sight:
         found = np.ones(len(strength), bool)
         for i in range(strength.shape[1]):
             if self.view.moves[i].any():
-                f = values(self.view, structure, grid, i)[:, self.view.moves[i]]
+                f = self._values(structure, grid, i)[:, self.view.moves[i]]
                 change = (strength[:, i : i + 1] * f).min(axis=1)
                 found &= change >= LEAST_FRICTION - 2 * self.frictions[i]
         return found
 
     def columns(self, structure: Structure, grid: Mapping[str, np.ndarray]) -> np.ndarray:
         """How the formula with a strength of 1 shows, `[object, value, point of the grid]`."""
-        found = accelerations(self.view, structure, grid, self.masses)
+        found = self.accelerations(structure, grid)
         acting = self.responses if structure.is_on_all else self.responses[:1]
         return np.stack([response @ own.T for response, own in zip(acting, found, strict=False)])
 
+    def accelerations(self, structure: Structure, grid: Mapping[str, np.ndarray]) -> np.ndarray:
+        """By a formula with a strength of 1, m/s^2, `[object, point of the grid, time]`.
 
-def masses_and_frictions(view: View) -> tuple[np.ndarray, np.ndarray]:
-    """The objects' masses in kg and their friction coefficients, as fitted; 0 of those without."""
-    theta = view.trials.theta(view.fit.z, view.fit.free)
-    named = view.model.by_name(view.trials.of_clip(theta, 0))
-    masses, frictions = (
-        np.array([float(named.get(f"{name}{i + 1}", 0.0)) for i in range(len(view.path_m))])
-        for name in ("m", "k")
-    )
-    return masses, frictions
+        Along the fitted motion; those of a friction, by a change of its coefficient.
+        """
+        view, found = self.view, []
+        scene = view.model.scene.surroundings
+        for i, (q, v) in enumerate(zip(view.path_m, view.speed_m_s, strict=True)):
+            f = self._values(structure, grid, i)
+            if structure.nature != "push":
+                f = -np.sign(v) * f
+            if structure.nature == "friction":
+                f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
+            if structure.nature == "drag_force" and i > 0:
+                f = f * self.masses[0] / self.masses[i]
+            found.append(f if i == 0 or structure.is_on_all else np.zeros_like(f))
+        return np.stack(found)
 
-
-def accelerations(
-    view: View, structure: Structure, grid: Mapping[str, np.ndarray], masses_kg: np.ndarray
-) -> np.ndarray:
-    """Accelerations by a formula with a strength of 1, m/s^2, `[object, point of the grid, time]`.
-
-    Along the fitted motion; those of a friction, by a change of its coefficient.
-    """
-    scene, found = view.model.scene.surroundings, []
-    for i, (q, v) in enumerate(zip(view.path_m, view.speed_m_s, strict=True)):
-        f = values(view, structure, grid, i)
-        if structure.nature != "push":
-            f = -np.sign(v) * f
+    def _values(self, structure: Structure, grid: Mapping[str, np.ndarray], i: int) -> np.ndarray:
+        """On the way of object i, `[point of the grid, time]`; of a friction its change."""
+        view, size = self.view, len(next(iter(grid.values()))) if grid else 1
+        constants = {name: own[:, None] for name, own in grid.items()}
+        f = structure.value(view.time_s, view.path_m[i], view.speed_m_s[i], constants)
         if structure.nature == "friction":
-            f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
-        if structure.nature == "drag_force" and i > 0:
-            f = f * masses_kg[0] / masses_kg[i]
-        found.append(f if i == 0 or structure.is_on_all else np.zeros_like(f))
-    return np.stack(found)
-
-
-def values(view: View, structure: Structure, grid: Mapping[str, np.ndarray], i: int) -> np.ndarray:
-    """A formula on the way of object i, `[point of the grid, time]`; of a friction its change."""
-    size = len(next(iter(grid.values()))) if grid else 1
-    constants = {name: own[:, None] for name, own in grid.items()}
-    f = structure.value(view.time_s, view.path_m[i], view.speed_m_s[i], constants)
-    if structure.nature == "friction":
-        f = f - structure.value(0.0, view.start_path_m[i], 0.0, constants)
-    return np.broadcast_to(f, (size, len(view.time_s)))
+            f = f - structure.value(0.0, view.start_path_m[i], 0.0, constants)
+        return np.broadcast_to(f, (size, len(view.time_s)))

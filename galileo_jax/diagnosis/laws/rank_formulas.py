@@ -21,7 +21,6 @@ import numpy as np
 
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
 from galileo_jax.diagnosis.laws.linearised_clip import Sight
-from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.diagnosis.thresholds import LENGTH_ODDS
 
 NUM_LAWS, NUM_OF_FAMILY, NUM_STARTS = 8, 2, 3
@@ -54,21 +53,20 @@ class Suggestion:
     score: float
 
 
-def suggestions(views: Sequence[View], wanted: Collection[Shape] = ()) -> list[Suggestion]:
+def suggestions(sights: Sequence[Sight], wanted: Collection[Shape] = ()) -> list[Suggestion]:
     """The formulas that promise most, best first."""
-    return chosen(_suggested(views), wanted)
+    return chosen(_suggested(sights), wanted)
 
 
-def of_family(views: Sequence[View], family: str) -> list[Suggestion]:
+def of_family(sights: Sequence[Sight], family: str) -> list[Suggestion]:
     """Every formula of a family, whatever it acts by and on whom, best first."""
-    return sorted(_suggested(views, family), key=lambda one: -one.score)
+    return sorted(_suggested(sights, family), key=lambda one: -one.score)
 
 
-def _suggested(views: Sequence[View], family: str | None = None) -> list[Suggestion]:
+def _suggested(sights: Sequence[Sight], family: str | None = None) -> list[Suggestion]:
     """All formulas that show, or those of one family."""
-    sights = [Sight.of(view) for view in views]
-    scene = views[0].model.scene.surroundings
-    ranges = ranges_of(views)
+    scene = sights[0].view.model.scene.surroundings
+    ranges = ranges_of(sights)
     return [
         one
         for structure in structures(scene.has_surface, len(scene.names))
@@ -119,8 +117,9 @@ def _best_of(found: Sequence[Suggestion], shape: Shape) -> list[Suggestion]:
     return sorted(alike, key=lambda one: one.structure.is_on_all != is_on_all)[:1]
 
 
-def ranges_of(views: Sequence[View]) -> dict[str, tuple[float, float]]:
+def ranges_of(sights: Sequence[Sight]) -> dict[str, tuple[float, float]]:
     """What of time and place is seen in motion."""
+    views = [sight.view for sight in sights]
     times = np.concatenate([view.time_s[view.moves.any(axis=0)] for view in views])
     places = np.concatenate([view.path_m[view.moves] for view in views])
     if not places.size:
