@@ -29,7 +29,7 @@ from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.experiment.choose import best_first, expect
 from galileo_jax.experiment.hypothesis_probabilities import beliefs_of
-from galileo_jax.experiment.measured import write_clip
+from galileo_jax.experiment.lab import write_clip
 from galileo_jax.experiment.plan import middle
 from galileo_jax.experiment.settings import Can, Range, grid
 from galileo_jax.inference.fits.gradient import GradientFitter

@@ -11,8 +11,7 @@ from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.next_experiment import rehearsed
 from galileo_jax.experiment.choose import LITTLE
 from galileo_jax.experiment.journal import Journal, law_row, open_journal
-from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
-from galileo_jax.experiment.measured import write_clip
+from galileo_jax.experiment.lab import Described, Lab, LabError, program_of, write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
 from galileo_jax.experiment.settings import Can
 from galileo_jax.runtime import progress

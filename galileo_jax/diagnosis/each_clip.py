@@ -20,6 +20,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from galileo_jax.comparison.compare import ADEQUATE_P, JUDGED_SCALE_RANGE, Comparison
+from galileo_jax.diagnosis.thresholds import ALIKE_P
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import velocity_error
@@ -28,7 +29,6 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.similarity.gaussian_likelihood import whitening_in
 
 NUM_PARTS = 4  # quarters, as they are called
-ALIKE_P = 0.01
 MOST_ALIKE = 0.99  # of neighbours
 FINE = 20  # steps from frame to frame in which accelerations are summed up
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from galileo_jax.diagnosis.thresholds import PUSHES_SD
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import averaged, linear_clips
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
@@ -25,7 +26,6 @@ from galileo_jax.statespace.path_deviation import PLACE, SPEED, deviations
 from galileo_jax.statespace.term import TERMS
 from galileo_jax.statespace.terms.friction_roughness import LENGTH_M, NAME
 
-CLEAR = 3.0  # standard deviations below zero
 SHOWN = 4  # steps of a stretch that tell an acceleration, as in `statespace.kinematics`
 STEP = 1e-4  # of z, for slopes
 
@@ -50,7 +50,7 @@ class Stretch(NamedTuple):
     @property
     def pushes(self) -> bool:
         """Whether it is negative beyond doubt: no surface pushes what slides on it."""
-        return self.mean + CLEAR * self.sd < 0
+        return self.mean + PUSHES_SD * self.sd < 0
 
 
 def friction_along_way(

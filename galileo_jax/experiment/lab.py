@@ -3,7 +3,8 @@
 `LAB --describe` prints JSON: `{"settings": {"height_m": {"low": 0.1, "high": 0.5}, "fps":
 {"choices": [30, 60]}}, "clip": {what a clip's yaml declares}}`. Without arguments it reads one JSON
 object of settings from standard input and writes a csv track to standard output. Exit code 0: done;
-2 and a line on standard error: the settings are refused.
+2 and a line on standard error: the settings are refused. What it answered becomes a clip, or a line
+that says why it is none.
 """
 
 import contextlib
@@ -21,10 +22,22 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any, Protocol, runtime_checkable
 
-from galileo_jax.experiment.settings import Can, Choices, parse_can
+import numpy as np
+
+from galileo_jax.clip.load import check_clip, load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.clip.track_noise import position_noise_m
+from galileo_jax.clip.yaml_file import yaml_text
+from galileo_jax.experiment.settings import Can, Choices, known_as, parse_can
+from galileo_jax.results.stale_outputs import digest
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import check_cancelled
 
+DECLARED = {"angle": "ramp_angle_deg", "fps": "fps"}
+MOST_NOISE_M = 0.05  # of a coordinate: no camera is so bad, and random numbers are worse
 DESCRIBE = "--describe"
 REFUSED = 2
 LOOK_S = 0.1  # between two looks at whether it is done, must be stopped, or goes on for ever
@@ -195,3 +208,63 @@ def _line(text: str) -> str:
     """The last line of what was said, cut."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     return " ".join(lines[-1].split())[:LINE] if lines else ""
+
+
+def write_clip(
+    path: Path,
+    text: str,
+    declared: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    others: Mapping[int, Path] | None = None,
+) -> Clip:
+    """Writes a track and the yaml beside it.
+
+    Angle and frame rate of the settings are declared, too. The track may be none of the `others`,
+    by the number of their experiment.
+
+    Raises:
+      LabError: it is no track, no clip, or the same as before; nothing is left of it then.
+    """
+    update = {
+        DECLARED[known_as(name)]: value
+        for name, value in settings.items()
+        if known_as(name) in DECLARED
+    }
+    scenario = declared.get("scenario")  # one that is not known is for `check_clip` to refuse
+    if scenario in SCENARIOS and not SCENARIOS[str(scenario)].has_ramp:
+        update.pop("ramp_angle_deg", None)
+    content = {key: value for key, value in declared.items() if key != "video"}
+    content |= {"track": path.name, **update}
+    if not text.strip():
+        raise LabError("an empty answer; a csv track expected")
+    write_text(path, text)
+    yaml = path.with_suffix(".yaml")
+    try:
+        # Before the clip is: at another angle the same track has no place.
+        _check_track(path, others or {})
+        check_clip(yaml, content)
+        write_text(yaml, yaml_text(content))
+        return load_clip(yaml)
+    except InputError as error:
+        path.unlink(missing_ok=True)
+        yaml.unlink(missing_ok=True)
+        said = str(error).removeprefix(f"{path}: ").removeprefix(f"{yaml}: ")
+        raise LabError(" ".join(said.split())) from error
+
+
+def _check_track(path: Path, others: Mapping[int, Path]) -> None:
+    """Raises `InputError` where its numbers are those of no motion, or of another track's."""
+    seen = read_observation_csv(path)
+    for name, place in zip(seen.names, seen.position_m, strict=True):
+        noise = max(position_noise_m(seen.times_s, row) for row in place)
+        if noise > MOST_NOISE_M:
+            raise InputError(
+                f"{path}: {name}: places scatter by {noise:.2g} m from frame to frame; a track in "
+                "metres expected"
+            )
+        if not np.isfinite(place).any():
+            raise InputError(f"{path}: {name}: is never seen")
+    own = digest(seen)
+    for number, other in others.items():
+        if digest(read_observation_csv(other)) == own:
+            raise InputError(f"{path}: the same track as in experiment {number}")
