@@ -81,7 +81,7 @@ def test_the_reasons_say_which_pairs_were_looked_at():
     assert "16 pairs of effects that come near it were fitted roughly" in why.sentence
     assert "the 3 most probable of them with care" in why.sentence
     assert (why.numbers["num_near"], why.numbers["num_pairs"]) == (16, 3)
-    near = {"rival": "air_drag+rolling", "log_odds_behind": 4.4, "num_near": 16}
+    near: dict[str, Any] = {"rival": "air_drag+rolling", "log_odds_behind": 4.4, "num_near": 16}
     why = because("no_pair_contests", AIR_DRAG, **near)
     assert "each of them is more than 10 times less probable" in why.sentence  # 81 times
     assert (why.numbers["rival"], why.numbers["log_odds_behind"]) == ("air_drag+rolling", 4.4)
