@@ -80,9 +80,10 @@ class Comparison:
     @in_float64
     def plot(self) -> "go.Figure":
         """Measured and fitted motion along the path, with the stretches where it fails shaded."""
-        from galileo_jax.report.figures import comparison_figure
+        from galileo_jax.report.diagnosis_charts import comparison_chart
+        from galileo_jax.report.draw import to_plotly
 
-        return comparison_figure(self.paths)
+        return to_plotly(comparison_chart(self.paths))
 
     @in_float64
     def report(self, path: str | Path) -> Path:

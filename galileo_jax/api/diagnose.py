@@ -218,9 +218,10 @@ class Diagnosis:
     @in_float64
     def plot(self) -> "go.Figure":
         """The error over the rounds, and the candidates' probabilities."""
-        from galileo_jax.report.figures import diagnosis_figure
+        from galileo_jax.report.diagnosis_charts import diagnosis_chart
+        from galileo_jax.report.draw import to_plotly
 
-        return diagnosis_figure(self.found)
+        return to_plotly(diagnosis_chart(self.found))
 
     @in_float64
     def report(self, path: str | Path) -> Path:

@@ -196,12 +196,14 @@ class Fit:
           InputError: no such clip.
         """
         from galileo_jax.prediction.posterior_predictive import posterior_predictive
-        from galileo_jax.report.figures import fit_figure
+        from galileo_jax.report.draw import to_plotly
+        from galileo_jax.report.fit_charts import fit_chart
 
         runs = {run.problem.name: run for run in self.runs(self.folder or Path("."))}
         if (clip := clip or self.names[0]) not in runs:
             raise InputError(f"no clip {clip!r} in this fit; known: {', '.join(runs)}")
-        return fit_figure(posterior_predictive(runs[clip], int(self.result["seed"])))
+        fitted = posterior_predictive(runs[clip], int(self.result["seed"]))
+        return to_plotly(fit_chart(fitted))
 
     @in_float64
     def report(self, path: str | Path) -> tuple[Path, ...]:

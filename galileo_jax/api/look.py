@@ -56,7 +56,7 @@ class Look:
 
             return write_marks(understand(self.path), path)
         from galileo_jax.report.draw import write_picture
-        from galileo_jax.report.look_chart import look_chart
+        from galileo_jax.report.track_chart import look_chart
 
         return write_picture(Path(path), look_chart(self.seen, self.table))
 

@@ -76,9 +76,10 @@ class NextExperiment:
 
     def plot(self) -> "go.Figure":
         """The gain against every setting."""
-        from galileo_jax.report.experiment_page import gains_figure
+        from galileo_jax.report.draw import to_plotly
+        from galileo_jax.report.experiment_page import gains_chart
 
-        return gains_figure(self.document)
+        return to_plotly(gains_chart(self.document))
 
     def report(self, path: str | Path) -> Path:
         """Writes the page: one HTML file, no network needed."""

@@ -79,9 +79,10 @@ class Prediction:
     @in_float64
     def plot(self) -> "go.Figure":
         """Places over time with 95 % bands, measured points, and where the clip ends."""
-        from galileo_jax.report.figures import prediction_figure
+        from galileo_jax.report.draw import to_plotly
+        from galileo_jax.report.prediction import prediction_chart
 
-        return prediction_figure(self.run, self.motions)
+        return to_plotly(prediction_chart(self.run, self.motions))
 
     @in_float64
     def save(self, folder: str | Path) -> tuple[Path, ...]:
@@ -91,9 +92,8 @@ class Prediction:
           InputError: the folder cannot be written.
         """
         from galileo_jax.report.draw import to_svg
-        from galileo_jax.report.first_and_last import write_first_and_last
-        from galileo_jax.report.prediction import write_prediction
-        from galileo_jax.report.prediction_chart import prediction_chart
+        from galileo_jax.report.prediction import prediction_chart, write_prediction
+        from galileo_jax.report.side_view import write_first_and_last
 
         out = Path(folder)
         chart = prediction_chart(self.run, self.motions)

@@ -92,9 +92,10 @@ class Track:
 
     def plot(self) -> "go.Figure":
         """Positions and velocities over time, one panel per axis."""
-        from galileo_jax.report.figures import track_figure
+        from galileo_jax.report.draw import to_plotly
+        from galileo_jax.report.track_chart import track_chart
 
-        return track_figure(self.observation, self.name)
+        return to_plotly(track_chart(self.observation, self.name))
 
     def save(self, path: str | Path) -> Path:
         """Writes a csv that `load` reads again: in metres, or in pixels where no scale is known.

@@ -1,9 +1,12 @@
 """`train`: the neural estimators, and their errors on new samples."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from galileo_jax.files.package_data import config_path
 from galileo_jax.rollout.engine_names import ENGINES
@@ -17,6 +20,7 @@ from galileo_jax.runtime.progress import CancelFlag, OnProgress
 if TYPE_CHECKING:
     from galileo_jax.neural.config import TrainConfig
     from galileo_jax.neural.evaluation import Evaluation
+    from galileo_jax.report.chart import Chart
 
 PRESETS = ("thesis", "galileo")
 LEAST = {"samples": 100, "max_epochs": 1, "frames": 25, "seed": 0}
@@ -107,7 +111,6 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     from galileo_jax.neural.task import make_task
     from galileo_jax.neural.training import train as train_network
     from galileo_jax.report.draw import to_svg
-    from galileo_jax.report.training_chart import loss_chart
 
     task = make_task(config)
     began = time.perf_counter()
@@ -116,7 +119,7 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     data_s = time.perf_counter() - began
     with progress.part(SHARE_DATA, 1.0):
         done = train_network(task, config, samples, out)
-    write_text(out / "loss.svg", to_svg(loss_chart(done.losses)))
+    write_text(out / "loss.svg", to_svg(_loss_chart(done.losses)))
     seconds = time.perf_counter() - began
     write_json(
         out / "training.json",
@@ -128,6 +131,20 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
         },
     )
     return Trained(out, done.losses, done.best, seconds, data_s)
+
+
+def _loss_chart(losses: Sequence[tuple[float, float]]) -> "Chart":
+    """`losses`: `(training, validation)` of every epoch."""
+    from galileo_jax.report.chart import Chart, Line, Panel
+
+    values = np.asarray(losses)
+    epochs = np.arange(1, len(values) + 1)
+    lines = tuple(
+        Line(epochs, values[:, i], colour, name, width_px=1.4)
+        for i, (name, colour) in enumerate((("training", "object1"), ("validation", "object2")))
+    )
+    panel = Panel("loss", lines, xlabel="epoch", is_log_y=bool((values > 0).all()))
+    return Chart("loss", "training and validation loss against the epoch", (panel,))
 
 
 @in_float64

@@ -21,7 +21,7 @@ from galileo_jax.rollout.motion import pitch
 MM = 1000.0  # per metre: the SVG's units
 SLOWER = 3  # times slower than the clip
 MOST_STEPS = 480  # of the slider, without a video
-CROSS_PX, DOT_PX, PAGE_PX = 9.0, 1.6, 1000.0  # half a cross, half a dot, on a page so wide
+CROSS_PX, DOT_PX, PAGE_PX = 9.0, 3.2, 1000.0  # half a cross, a dot, on a page so wide
 
 
 def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray]) -> str:
@@ -38,16 +38,16 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
     predicted_m = {name: motion[:, :2] for name, motion in predicted_m.items()}
     models = list(predicted_m)
     offset = observation.offset_m(predicted_m[models[-1]])[..., None]
-    video = _frames(clip, len(observation.times_s))
+    count = len(observation.times_s)
+    video = _frames(clip, count)
     # Over a frame, shapes stand around the tracked point, in a drawing around the centre.
     motions = {name: motion + offset * (video is not None) for name, motion in predicted_m.items()}
     motions["measured"] = observation.position_m[:, :2] - offset * (video is None)
     view = view_of(clip, problem.model.scene, np.stack(list(motions.values())))
-    steps = video.frames if video else range(0, len(observation.times_s), _stride(problem))
-    chosen = {name: motion[..., list(steps)] for name, motion in motions.items()}
+    steps = list(video.frames if video else range(0, count, -(-count // MOST_STEPS)))
     data = {
-        "times": observation.times_s[list(steps)].round(4).tolist(),
-        "motions": {name: _places(problem, motion) for name, motion in chosen.items()},
+        "times": observation.times_s[steps].round(4).tolist(),
+        "motions": {name: _places(problem, one[..., steps]) for name, one in motions.items()},
         "pictures": list(video.pictures) if video else [],
         "slower": SLOWER,
     }
@@ -58,7 +58,7 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
         f"<figcaption>{escape(_caption(video, problem))}</figcaption>"
         f"{_stage(clip, problem, motions, models, view, video)}"
         f'<div class="controls"><button type="button">Play</button>'
-        f'<input type="range" min="0" max="{len(data["times"]) - 1}" value="0" '
+        f'<input type="range" min="0" max="{len(steps) - 1}" value="0" '
         f'aria-label="time in {name}"><output></output></div>{_legend(problem, models, video)}'
         f'<script type="application/json">{encoded}</script></figure>'
     )
@@ -69,45 +69,34 @@ def _frames(clip: Clip, num_frames: int) -> VideoFrames | None:
 
     Nor where the picture is distorted, while the motion is drawn square.
     """
-    if clip.video is None or not clip.video.is_file() or not clip.is_camera_plain:
-        return None
-    if clip.origin_px is None and clip.objects[0].point_px is None:
+    has_origin = clip.origin_px is not None or clip.objects[0].point_px is not None
+    if clip.video is None or not clip.video.is_file() or not clip.is_camera_plain or not has_origin:
         return None
     return sample_frames(clip.video, num_frames)
 
 
-def _stride(problem: Problem) -> int:
-    return -(-len(problem.observation.times_s) // MOST_STEPS)
-
-
 def _caption(video: VideoFrames | None, problem: Problem) -> str:
+    keys = "Arrow keys move the slider frame by frame."
     if video is None:
         side = "above" if problem.model.scene.surroundings.is_level else "the side"
-        return f"The scene from {side}. Arrow keys move the slider frame by frame."
+        return f"The scene from {side}. {keys}"
     step = video.frames[1] - video.frames[0] if len(video.frames) > 1 else 1
     every = "" if step == 1 else f" One frame in {step} is shown."
-    return (
-        "The clip, with the tracked points and the fitted motion drawn over it."
-        f"{every} Arrow keys move the slider frame by frame."
-    )
+    return f"The clip, with the tracked points and the fitted motion drawn over it.{every} {keys}"
 
 
 def _legend(problem: Problem, models: list[str], video: VideoFrames | None) -> str:
-    entries = [
-        ("fill", object_colour(i), f"{name}, {models[-1]}")
-        for i, name in enumerate(problem.observation.names)
-    ]
+    scene, names = problem.model.scene.surroundings, problem.observation.names
+    entries = [("fill", object_colour(i), f"{name}, {models[-1]}") for i, name in enumerate(names)]
     if len(models) > 1:
         entries.append(("dashed", "soft", ", ".join(models[:-1])))
-    if video:
-        entries.append(("cross", "ink", "measured"))
-        scene = problem.model.scene.surroundings
-        if scene.has_surface and not scene.is_level:
-            entries.append(("line", "soft", "ramp and table as declared"))
-        if scene.walls_m:
-            entries.append(("line", "soft", "walls as declared"))
-    else:
-        entries.append(("line", "ink", "measured (outline; its path dotted)"))
+    if video is None:
+        return legend([*entries, ("line", "ink", "measured (outline; its path dotted)")])
+    entries.append(("cross", "ink", "measured"))
+    if scene.has_surface and not scene.is_level:
+        entries.append(("line", "soft", "ramp and table as declared"))
+    if scene.walls_m:
+        entries.append(("line", "soft", "walls as declared"))
     return legend(entries)
 
 
@@ -123,64 +112,52 @@ def _stage(
     width, height = MM * (view.right_m - view.left_m), MM * (view.top_m - view.bottom_m)
     left = -MM * view.right_m if view.is_mirrored else MM * view.left_m
     turn = ' transform="scale(-1 1)"' if view.is_mirrored else ""
-    scene = problem.model.scene
-    bodies = [_body(clip, problem, i) for i in range(len(clip.objects))]
-    ground = "".join(_surface(slab, video is not None) for slab in surfaces(scene, view))
-    drawn = [ground, _trails(motions["measured"], DOT_PX * width / PAGE_PX)]
-    for model in models:
-        for i, body in enumerate(bodies):
-            colour = f"var(--{object_colour(i)})"
-            if model == models[-1]:
-                look = f'fill="{colour}" fill-opacity="{0.45 if video else 0.8}" stroke="{colour}"'
-            else:
-                look = f'fill="none" stroke="{colour}" stroke-dasharray="4 3"'
-            drawn.append(_shape(model, i, look, body))
+    drawn = [_surface(slab, video is not None) for slab in surfaces(problem.model.scene, view)]
+    drawn += map(_trail, motions["measured"])
     arm = CROSS_PX * width / PAGE_PX
     cross = f'<path d="M{-arm:.1f} 0H{arm:.1f}M0 {-arm:.1f}V{arm:.1f}"/>'
-    for i, body in enumerate(bodies):
-        look = 'fill="none" stroke="currentColor" stroke-width="1.5"'
-        drawn.append(_shape("measured", i, look, cross if video else body))
-    size = video.size_px if video else (0, 0)
-    canvas = f'<canvas width="{size[0]}" height="{size[1]}"></canvas>' if video else ""
-    names = " and ".join(problem.observation.names)
+    bodies = [_body(clip, problem, i) for i in range(len(clip.objects))]
+    for of in (*models, "measured"):
+        for i, body in enumerate(bodies):
+            colour = f"var(--{object_colour(i)})"
+            look = f'fill="none" stroke="{colour}" stroke-dasharray="4 3"'
+            if of == models[-1]:
+                look = f'fill="{colour}" fill-opacity="{0.45 if video else 0.8}" stroke="{colour}"'
+            if of == "measured":
+                look = 'fill="none" stroke="currentColor" stroke-width="1.5"'
+                body = cross if video else body
+            name = escape(of, quote=True)
+            drawn.append(f'<g data-of="{name}" data-object="{i}" {look}>{body}</g>')
+    canvas = ""
+    if video:
+        canvas = f'<canvas width="{video.size_px[0]}" height="{video.size_px[1]}"></canvas>'
+    names = escape(" and ".join(problem.observation.names), quote=True)
     return (
         f'<div class="stage{" filmed" if video else ""}" '
         f'style="aspect-ratio:{width:.1f}/{height:.1f}">{canvas}'
-        f'<svg role="img" aria-label="{escape(names, quote=True)}, measured and simulated, at the '
-        f"slider's time\" "
+        f'<svg role="img" aria-label="{names}, measured and simulated, at the slider\'s time" '
         f'viewBox="{left:.1f} {-MM * view.top_m:.1f} {width:.1f} {height:.1f}">'
         f"<g{turn}>{''.join(drawn)}</g></svg></div>"
     )
 
 
-def _shape(of: str, index: int, look: str, body: str) -> str:
-    return f'<g data-of="{escape(of, quote=True)}" data-object="{index}" {look}>{body}</g>'
-
-
-def _trails(measured_m: np.ndarray, radius: float) -> str:
-    """Every measured place as a dot of so many mm."""
-    r = f"{radius:.1f}"
-    dot = f"m-{r} 0a{r} {r} 0 1 0 {2 * radius:.1f} 0a{r} {r} 0 1 0 {-2 * radius:.1f} 0"
-    found = []
-    for x, y in measured_m:
-        seen = np.isfinite(x) & np.isfinite(y)
-        places = zip(MM * x[seen], -MM * y[seen], strict=True)
-        dots = "".join(f"M{a:.1f} {b:.1f}{dot}" for a, b in places)
-        found.append(f'<path class="trail" d="{dots}" fill="currentColor"/>')
-    return "".join(found)
+def _trail(measured_m: np.ndarray) -> str:
+    """Every measured place of an object as a dot."""
+    x, y = measured_m[:, np.isfinite(measured_m).all(axis=0)]
+    dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(MM * x, -MM * y, strict=True))
+    look = f'fill="none" stroke="currentColor" stroke-width="{DOT_PX}" stroke-linecap="round"'
+    return f'<path class="trail" d="{dots}" {look}/>'
 
 
 def _places(problem: Problem, motion_m: np.ndarray) -> list[list[list[float] | None]]:
     """`[object][frame]` of x, y (mm, y down) and turn (degrees, clockwise); None where not seen."""
     scene = problem.model.scene.surroundings
     turned = pitch(np.nan_to_num(np.moveaxis(motion_m, 1, -1).swapaxes(0, 1)), scene).T
-    found = []
-    for i, (x, y) in enumerate(motion_m):
-        rows = zip(MM * x, -MM * y, -np.degrees(turned[i]), strict=True)
-        found.append(
-            [[round(float(v), 1) for v in row] if np.isfinite(row).all() else None for row in rows]
-        )
-    return found
+    rows = np.stack([MM * motion_m[:, 0], -MM * motion_m[:, 1], -np.degrees(turned)], axis=-1)
+    return [
+        [place if np.isfinite(place).all() else None for place in one]
+        for one in rows.round(1).tolist()
+    ]
 
 
 def _body(clip: Clip, problem: Problem, index: int) -> str:

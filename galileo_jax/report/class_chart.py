@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from galileo_jax.comparison.consensus import Consensus
+from galileo_jax.report.html_page import prose, section
 from galileo_jax.results.shown import number
 
 WIDTH_PX, HEIGHT_PX = 720, 150  # of the frame with its margins, without names
@@ -15,6 +16,11 @@ LEFT_PX, RIGHT_PX, TOP_PX = 62, 8, 8
 NAMES_PX, LETTERS = 74, 14  # room for slanted names, and how many letters of them fit there
 LETTER_PX = 11  # of slanted names so near to each other none can be read
 HALF_95 = 1.96  # standard deviations
+CLASS_NOTE = (
+    "Each group with its 95 % interval. Line: the class's value. Band: where 95 % of groups "
+    "would be if each measured without error. Diamond: a group that lies outside, further from "
+    "what the others find than its own uncertainty and the scatter between groups explain."
+)
 
 
 @dataclass(frozen=True)
@@ -110,16 +116,9 @@ def class_section(found: Sequence[Agreement]) -> str:
     """A sentence and a strip chart of each quantity as HTML, with a heading; empty of none."""
     if not found:
         return ""
-    parts = "".join(f"<p>{escape(one.sentence)}</p>{strip_chart(one)}" for one in found)
-    note = (
-        "Each group with its 95 % interval. Line: the class's value. Band: where 95 % of groups "
-        "would be if each measured without error. Diamond: a group that lies outside, further from "
-        "what the others find than its own uncertainty and the scatter between groups explain."
-    )
-    return (
-        f'<h2>What the class found</h2>\n<figure class="class">{parts}'
-        f"<figcaption>{note}</figcaption></figure>"
-    )
+    parts = "".join(f"{prose(one.sentence)}{strip_chart(one)}" for one in found)
+    note = f"<figcaption>{CLASS_NOTE}</figcaption>"
+    return section("What the class found", f'<figure class="class">{parts}{note}</figure>')
 
 
 def _limits(one: Agreement, spread: float) -> tuple[float, float]:

@@ -14,12 +14,11 @@ from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
+from galileo_jax.report import html_page as html
 from galileo_jax.report.animation import animation
-from galileo_jax.report.comparison_charts import failure_chart
+from galileo_jax.report.diagnosis_charts import failure_chart
 from galileo_jax.report.fit_text import pull_text
-from galileo_jax.report.html_page import chart_section, document, header, items, table
 from galileo_jax.report.provenance import provenance
-from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CELLS = 12
 FAILURES = (
@@ -27,6 +26,11 @@ FAILURES = (
     "the residuals in units of the stated noise: filled along the path, hollow across it; 95 % of "
     "noise is inside the grey band. Grey: transitions between phases. Yellow, where the model "
     "fails: the worst interval."
+)
+CELLS = (
+    "A cell is one object, axis and phase of the motion. z: the largest of its test statistics, in "
+    "standard deviations over data simulated with the fitted model. Autocorrelation: of "
+    "neighbouring residuals, about 0 for noise."
 )
 
 
@@ -45,21 +49,21 @@ def write_comparison_page(
     """Writes the page of a fitted model with these effects; `command` makes it again."""
     error = comparison.error
     paths = path_residuals(trials, fit, comparison, seed)
-    more = (
-        f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
-        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}).</p>\n"
-        f"{items(pull_text(asdict(pull)) for pull in pulled(comparison))}\n"
-        f'<p class="soft">The model: {escape(diagnosis_text.effects_text(effects))}.</p>'
+    left = (
+        f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
+        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f})."
     )
-    lead = diagnosis_text.adequacy(comparison, effects)
+    pulls = html.items(pull_text(asdict(pull)) for pull in pulled(comparison))
+    model = html.prose(f"The model: {diagnosis_text.effects_text(effects)}.", "soft")
     sections = [
-        header("comparison", title, lead, more, comparison.is_adequate),
-        failures("Residuals" if comparison.is_adequate else "Where the model fails", paths),
+        failures(comparison, paths),
         motion(clips, trials, {"fitted": trials.theta(fit.z, fit.free)}),
         cells(comparison, several=len(clips) > 1),
         provenance(command, clips, engine_and_seed(trials, seed)),
     ]
-    write_text(path, document(f"{title}: comparison", sections))
+    more = f"{html.prose(left)}\n{pulls}\n{model}"
+    lead = diagnosis_text.adequacy(comparison, effects)
+    html.write_page(path, "comparison", title, lead, sections, more, comparison.is_adequate)
 
 
 def engine_and_seed(trials: JointProblem, seed: int) -> dict[str, str]:
@@ -86,12 +90,13 @@ def motion(
         if len(clips) > 1:
             found.append(f"<h3>{escape(problem.name)}</h3>")
         found.append(animation(clip, problem, predicted))
-    return "<h2>Motion</h2>\n" + "\n".join(found)
+    return html.section("Motion", *found)
 
 
-def failures(heading: str, paths: Sequence[PathResiduals]) -> str:
-    """The charts of all objects."""
-    return chart_section(heading, FAILURES, map(failure_chart, paths))
+def failures(comparison: Comparison, paths: Sequence[PathResiduals], model: str = "") -> str:
+    """The charts of all objects; `model`: with its colon before it, for the heading."""
+    heading = "Residuals" if comparison.is_adequate else "Where the model fails"
+    return html.chart_section(f"{heading}{model}", FAILURES, map(failure_chart, paths))
 
 
 def cells(comparison: Comparison, several: bool) -> str:
@@ -100,11 +105,7 @@ def cells(comparison: Comparison, several: bool) -> str:
     for place in comparison.where[:NUM_CELLS]:
         row = [place.object, place.axis, place.phase, f"{place.rmse:.4f}", f"{place.noise:.4f}",
                f"{place.z:.1f}", f"{place.whiteness:.2f}"]  # fmt: skip
-        rows.append([escape(cell) for cell in ([place.clip, *row] if several else row)])
+        rows.append([place.clip, *row] if several else row)
     head = ["object", "axis", "phase", "rmse, m/s", "noise, m/s", "z", "autocorrelation"]
-    return (
-        "<h2>Worst cells</h2>\n<p>A cell is one object, axis and phase of the motion. z: the "
-        "largest of its test statistics, in standard deviations over data simulated with the "
-        "fitted model. Autocorrelation: of neighbouring residuals, about 0 for noise.</p>\n"
-        + table(["clip", *head] if several else head, rows)
-    )
+    found = html.table(["clip", *head] if several else head, rows)
+    return html.section("Worst cells", html.prose(CELLS), found)

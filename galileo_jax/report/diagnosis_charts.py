@@ -1,16 +1,100 @@
-"""Charts of a diagnosis: how the error falls, the candidates, and the missing force."""
+"""Charts of a comparison and a diagnosis: where the model fails, and what is missing in it."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.diagnosis import Candidate, MissingForce, Round
-from galileo_jax.report.chart import Band, Bars, Chart, Line, Mark, Panel, Points
+from galileo_jax.comparison.local_tests import WHOLE
+from galileo_jax.comparison.path_residuals import PathResiduals
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
+from galileo_jax.report.chart import Band, Bars, Chart, Line, Mark, Panel, Points, side_by_side
 from galileo_jax.report.diagnosis_text import effects_text
+from galileo_jax.report.fit_charts import residual_panel
 from galileo_jax.report.style import object_colour
 
 NUM_POINTS = 70  # of a scatter plot
+NUM_CANDIDATES = 8  # that are shown
+
+
+def failure_chart(one: PathResiduals) -> Chart:
+    """Measured (dots) and fitted (line, 95 % band) position and speed, and the residuals.
+
+    Residuals: filled along the path, hollow across it. The interval that fails worst is shaded.
+    """
+    colour = object_colour(one.index)
+    step = np.diff(one.times_s)
+    middle = one.times_s[:-1] + step / 2
+    position = Panel(
+        ylabel="along the path, m",
+        title=_title(one),
+        marks=(
+            Band(one.times_s, one.low_m, one.high_m, colour, "95 % of the model"),
+            Line(one.times_s, one.predicted_m, colour, "fitted"),
+            Points(one.times_s, one.measured_m, "ink", "measured"),
+        ),
+        highlights=(one.failing_s,),
+    )
+    speed = Panel(
+        ylabel="speed, m/s",
+        marks=(
+            Line(middle, np.diff(one.predicted_m) / step, colour, "fitted"),
+            Points(middle, np.diff(one.measured_m) / step, "ink", "measured"),
+        ),
+        highlights=(one.failing_s,),
+    )
+    label = f"{one.title}: position, speed and residuals of the fit, against time"
+    panels = (position, speed, _residuals(one, one.largest))
+    return Chart(f"failure_{one.clip}_{one.name}", label, panels, one.clip)
+
+
+def comparison_chart(paths: Sequence[PathResiduals]) -> Chart:
+    """A column for each object: position, speed, residuals; where the model fails is shaded."""
+    columns = [failure_chart(one) for one in paths]
+    return side_by_side("comparison", "position, speed and residuals", columns)
+
+
+def before_after_chart(
+    before: PathResiduals, after: PathResiduals, titles: tuple[str, str]
+) -> Chart:
+    """The residuals of one object before and after an effect was added, on the same axes."""
+    largest = max(before.largest, after.largest)
+    panels = tuple(
+        _residuals(one, largest, f"{one.title}: {title}")
+        for one, title in zip((before, after), titles, strict=True)
+    )
+    label = f"{after.title}: residuals before and after {titles[1]} was added"
+    added = titles[1].replace(", ", "+").replace(" ", "_")
+    return Chart(f"before_after_{after.clip}_{after.name}_{added}", label, panels, after.clip)
+
+
+def _title(one: PathResiduals) -> str:
+    if one.worst is None:
+        return one.title
+    where = "" if one.worst.phase == WHOLE else f", {one.worst.phase}"
+    return f"{one.title}: worst in {one.worst.axis}{where} (z = {one.worst.z:.0f})"
+
+
+def _residuals(one: PathResiduals, largest: float, title: str = "") -> Panel:
+    return residual_panel(
+        one.times_s,
+        {"along the path": one.along, "across the path": one.across},
+        one.index,
+        title=title,
+        phases=one.phases,
+        highlight=one.failing_s,
+        largest=largest,
+    )
+
+
+def diagnosis_chart(diagnosis: Diagnosis) -> Chart:
+    """The velocity error of each round, and the probabilities of the first candidates."""
+    rounds = rounds_chart(diagnosis.rounds)
+    if not diagnosis.candidates:
+        return rounds
+    candidates = candidates_chart(diagnosis.candidates[:NUM_CANDIDATES])
+    panels = (*rounds.panels, *candidates.panels)
+    return Chart("diagnosis", "velocity error and candidates", panels, panel_px=200)
 
 
 def rounds_chart(rounds: Sequence[Round]) -> Chart:

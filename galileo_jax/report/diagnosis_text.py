@@ -65,36 +65,31 @@ def why(found: Sequence[Reason]) -> list[str]:
 
 def verdict(diagnosis: Diagnosis) -> str:
     """Which effect the model lacks, in one sentence."""
-    found, first = diagnosis.verdict, diagnosis.base
+    found, without = diagnosis.verdict, p_equals(diagnosis.base.p_value)
     if any(why.rule == "nothing_moves" for why in found.reasons):
         return "Nothing moves: no effect can be told."
     if found.status == "none":
         noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
-        adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
-        return " ".join([adequate, *noise])
+        return " ".join([f"The model is adequate: no effect is missing ({without}).", *noise])
     if found.effects in UNEVEN:
         last = diagnosis.rounds[-1]
         return (
             f"{found.effects[0]} explains the data: the friction coefficient varies by "
             f"{roughness(last.hypothesis):.2g} along the way, more than on most surfaces "
-            f"({p_equals(diagnosis.base.p_value)} without, "
-            f"{p_equals(last.comparison.p_value)} with)."
+            f"({without} without, {p_equals(last.comparison.p_value)} with)."
         )
-    if found.status == "named":
-        names = " and ".join(found.effects)
-        verb = "explains" if len(found.effects) == 1 else "together explain"
-        chosen = {candidate.effects: candidate for candidate in diagnosis.candidates}
-        p = chosen[found.effects].p_value if found.effects in chosen else None
-        both = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
-        return f"{names} {verb} the data{both}."
     if found.status == "ambiguous":
         return ambiguity(found.effects if found.law is None else (*found.effects, found.law.text))
+    chosen = {candidate.effects: candidate.p_value for candidate in diagnosis.candidates}
+    p = chosen.get(found.effects)
+    if found.status == "named":
+        verb = "explains" if len(found.effects) == 1 else "together explain"
+        both = "" if p is None else f" ({without} without, {p_equals(p)} with)"
+        return f"{' and '.join(found.effects)} {verb} the data{both}."
     if found.law is not None:
-        (chosen,) = (c for c in diagnosis.candidates if c.effects == found.effects)
-        p = p_equals(chosen.p_value or 0.0)
         return (
             f"No known effect explains the data; a law does: {found.law.text} "
-            f"({p_equals(first.p_value)} without, {p} with)."
+            f"({without} without, {p_equals(p or 0.0)} with)."
         )
     where = "; see the missing force" if diagnosis.missing is not None else ""
     return f"{_leading(diagnosis)}No known effect explains the data{where}."
@@ -204,19 +199,18 @@ CLIPS_KINDS = {
 }
 
 
-def each_clip(record: Mapping[str, Any]) -> list[str]:
+def each_clip(record: Mapping[str, Any] | None) -> list[str]:
     """How clips that no model explains together differ: `each_clip` of diagnosis.json."""
+    if record is None:
+        return []
     found = [f"clips: {CLIPS_KINDS[record['kind']]}"]
     for one in record["clips"]:
-        parts = ", ".join(
-            f"{extra:+.3f} +- {sd:.3f}"
-            for extra, sd in zip(one["extra_acceleration_m_s2"], one["sd_m_s2"], strict=True)
-        )
+        extra = zip(one["extra_acceleration_m_s2"], one["sd_m_s2"], strict=True)
+        parts = ", ".join(f"{value:+.3f} +- {sd:.3f}" for value, sd in extra)
         found.append(
             f"{one['clip']}: chi2 per value {one['chi2_together']:.2f} when fitted with the "
-            "others, "
-            f"{one['chi2_alone']:.2f} alone ({p_equals(one['p_alone'])}); missing acceleration "
-            f"in each quarter of its path: {parts} m/s^2"
+            f"others, {one['chi2_alone']:.2f} alone ({p_equals(one['p_alone'])}); missing "
+            f"acceleration in each quarter of its path: {parts} m/s^2"
         )
     return found
 
@@ -247,7 +241,7 @@ def next_command(
 def strength_texts(
     effects: Sequence[str], entry: Mapping[str, Any], sign: str = "+-"
 ) -> dict[str, str]:
-    """The strengths of a candidate's effects as text, by name.
+    """The strengths of a candidate's effects as text, by name; one per clip where they differ.
 
     Where no object was weighed, a force is given per mass: only that is determined.
 
@@ -256,25 +250,13 @@ def strength_texts(
       entry: of the candidate in diagnosis.json.
       sign: before a standard deviation.
     """
-    derived = entry.get("derived", {})
-    found = {}
-    for name, strength in strengths(effects, entry["parameters"]).items():
-        per_mass = derived.get(f"{name}{SUFFIX}")
-        text = value_text(per_mass or strength, sign)
-        found[name] = f"{text} (over m1)" if per_mass else text
-    return found
-
-
-def strengths(
-    effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Mapping[str, Any]]:
-    """The entries of the effects' strengths; one per clip where each clip has its own."""
+    derived, parameters = entry.get("derived", {}), entry["parameters"]
     found = {}
     for effect in effects:
-        own = [
-            name
-            for name in parameters
-            if name == effect or name.removeprefix(f"{effect}_").isdecimal()
-        ]
-        found |= {name: parameters[name] for name in own}
+        for name, strength in parameters.items():
+            if name != effect and not name.removeprefix(f"{effect}_").isdecimal():
+                continue
+            per_mass = derived.get(f"{name}{SUFFIX}")
+            text = value_text(per_mass or strength, sign)
+            found[name] = f"{text} (over m1)" if per_mass else text
     return found

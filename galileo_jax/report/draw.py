@@ -11,8 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Mark, Panel, Points
-from galileo_jax.report.layout import CELL_PX, RIGHT_PX, layout_of
+from galileo_jax.report.chart import (
+    CELL_PX,
+    RIGHT_PX,
+    Band,
+    Bars,
+    Boxes,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    Points,
+    layout_of,
+)
 from galileo_jax.report.plotly_figure import figure
 from galileo_jax.report.style import matplotlib_style, palette, save_svg
 from galileo_jax.runtime.atomic_write import replacing, write_text

@@ -1,19 +1,13 @@
 """The pages of `next` and `discover`: what to measure next, and what was measured and why."""
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from galileo_jax.diagnosis.reasons import p_text
 from galileo_jax.experiment.settings import KNOWN, known_as
+from galileo_jax.report import html_page as html
 from galileo_jax.report.chart import Chart, Panel, Points
-from galileo_jax.report.diagnosis_text import p_text
-from galileo_jax.report.draw import to_plotly
-from galileo_jax.report.html_page import chart_section, document, header, items, table
-from galileo_jax.runtime.atomic_write import write_text
-
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
 NUM_ROWS = 20
 NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
@@ -22,31 +16,32 @@ NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
 def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
     """Writes the page of next.json."""
     names = _names(record)
-    title = ", ".join(Path(clip).stem for clip in record["clips"])
     about = record["about"] or "which hypothesis holds"
-    lead = str(record["sentence"])
     odds = [f"{name}: {share:.3f}" for name, share in record["hypotheses"].items()]
     rows = [
         [*(_value(row[name]) for name in names), *(_number(row[key]) for key in NUMBERS)]
         for row in record["settings"][:NUM_ROWS]
     ]
     head = [*map(_title, names), f"gain, nats, about {about}", "named", "lead, nats", "hit"]
+    note = (
+        "named: probability that the true hypothesis is then far enough ahead of all others; lead: "
+        "how far it is ahead on average; hit: probability that object 1 hits another object. "
+        f"next.json has all {len(record['settings'])}."
+    )
+    caption = (
+        f"The expected gain in nats about {about}, against each of the settings; one point for "
+        "every combination that was tried, the best in colour."
+    )
+    expected, gains = "What each setting is expected to show", [gains_chart(record)]
     sections = [
-        header("next experiment", title, lead),
-        f"<h2>What is open</h2>\n<p>Probabilities of the hypotheses so far.</p>{items(odds)}",
-        chart_section(
-            "What each setting is expected to show",
-            f"The expected gain in nats about {about}, against each of the settings; one point for "
-            "every combination that was tried, the best in colour.",
-            [gains_chart(record)],
-            "stack",
+        html.section(
+            "What is open", html.prose("Probabilities of the hypotheses so far."), html.items(odds)
         ),
-        f"<h2>Settings</h2>\n{table(head, rows)}\n<p class='soft'>named: probability that the "
-        "true hypothesis is then far enough ahead of all others; lead: how far it is ahead on "
-        "average; hit: probability that object 1 hits another object. next.json has all "
-        f"{len(record['settings'])}.</p>",
+        html.chart_section(expected, caption, gains, "stack"),
+        html.section("Settings", html.table(head, rows), html.prose(note, "soft")),
     ]
-    write_text(path, document(f"{title}: next experiment", sections))
+    title = ", ".join(Path(clip).stem for clip in record["clips"])
+    html.write_page(path, "next experiment", title, str(record["sentence"]), sections)
 
 
 def gains_chart(record: Mapping[str, Any]) -> Chart:
@@ -69,11 +64,6 @@ def gains_chart(record: Mapping[str, Any]) -> Chart:
     return Chart("gains", label, tuple(panels))
 
 
-def gains_figure(record: Mapping[str, Any]) -> "go.Figure":
-    """`gains_chart` for notebooks."""
-    return to_plotly(gains_chart(record))
-
-
 def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -> None:
     """Writes the page of discover.json."""
     names = list(record["lab"]["settings"])
@@ -81,17 +71,12 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         [
             str(one["number"]),
             *(_value(one["settings"].get(name)) for name in names),
-            escape(one["outcome"] or "not made"),
+            one["outcome"] or "not made",
         ]
         for one in record["experiments"]
     ]
     verdicts = [
-        [
-            str(len(one["clips"])),
-            escape(one["status"]),
-            escape(_what(one)),
-            escape(p_text(one["p_value"])),
-        ]
+        [str(len(one["clips"])), one["status"], _what(one), p_text(one["p_value"])]
         for one in record["rounds"]
     ]
     reasons = [
@@ -99,20 +84,18 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         for one in record["experiments"]
     ]
     words = [f"{len(one['clips'])}: {one['sentence']}" for one in record["rounds"]]
+    made = html.table(["no.", *map(_title, names), "what came of it"], experiments)
+    found = html.table(["clips", "verdict", "effects", "p without"], verdicts)
     held = [f"{name} = {value}" for name, value in record["held"].items()]
-    ended = f"<p>{escape(str(record['ended']))}.</p>" if record["ended"] else ""
-    is_good = bool(record["rounds"]) and record["rounds"][-1]["status"] in ("named", "none", "law")
     sections = [
-        header("discovery", path.parent.name or "lab", sentence, ended, is_good),
-        "<h2>Experiments</h2>\n"
-        + table(["no.", *map(_title, names), "what came of it"], experiments)
-        + f"\n<h3>Why</h3>\n{items(reasons)}",
-        "<h2>Verdicts</h2>\n"
-        + table(["clips", "verdict", "effects", "p without"], verdicts)
-        + f"\n<h3>In words</h3>\n{items(words)}",
-        f"<h2>Settings that stay the same</h2>\n{items(held)}" if held else "",
+        html.section("Experiments", made, "<h3>Why</h3>", html.items(reasons)),
+        html.section("Verdicts", found, "<h3>In words</h3>", html.items(words)),
+        html.section("Settings that stay the same", html.items(held)),
     ]
-    write_text(path, document("discovery", [part for part in sections if part]))
+    ended = html.prose(f"{record['ended']}.") if record["ended"] else ""
+    is_good = bool(record["rounds"]) and record["rounds"][-1]["status"] in ("named", "none", "law")
+    title = path.parent.name or "lab"
+    html.write_page(path, "discovery", title, sentence, sections, ended, is_good)
 
 
 def _what(one: Mapping[str, Any]) -> str:
@@ -134,7 +117,7 @@ def _title(name: str) -> str:
 
 
 def _value(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, int | float) else escape(str(value))
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def _number(value: float | None) -> str:

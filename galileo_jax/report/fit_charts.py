@@ -14,6 +14,7 @@ from galileo_jax.report.chart import (
     Line,
     Panel,
     Points,
+    side_by_side,
     stacked,
     time_limits,
     with_room,
@@ -60,34 +61,16 @@ def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
     return Chart(f"residuals_{name}", label, (fit_residual_panel(fitted, index),), clip)
 
 
-def object_chart(fitted: PosteriorPredictive, index: int) -> Chart:
-    """Both velocities of one object, and its residuals below."""
-    name = fitted.observation.names[index]
-    velocities = (profile_panel(fitted, "velocity", index, axis) for axis in axes_of(fitted))
-    label = f"velocity of {name} against time, measured and fitted, and residuals"
-    return stacked(f"fit_{name}", label, (*velocities, fit_residual_panel(fitted, index)))
+def fit_chart(fitted: PosteriorPredictive) -> Chart:
+    """A column for each object: velocities in x and y, measured and fitted, and residuals.
 
-
-def track_chart(observation: Observation, axis: int) -> Chart:
-    """The measured positions of all objects along one axis, each with its 95 % interval."""
-    marks = tuple(
-        Points(
-            observation.times_s,
-            observation.position_m[i, axis],
-            object_colour(i),
-            name,
-            sd=np.sqrt(observation.covariance_m2[i, axis, axis]),
-        )
-        for i, name in enumerate(observation.names)
-    )
-    along = observation.axes[axis]
-    panel = Panel(
-        f"{along}, {_unit(observation, axis)}",
-        marks,
-        xlabel="time, s",
-        xlim=time_limits(observation.times_s),
-    )
-    return Chart(f"track_{along}", f"measured {along} against time", (panel,))
+    Velocities in m/s with 95 % bands, residuals in units of the tracking noise.
+    """
+    columns = []
+    for i in range(len(fitted.observation.names)):
+        velocities = (profile_panel(fitted, "velocity", i, axis) for axis in axes_of(fitted))
+        columns.append(stacked("", "", (*velocities, fit_residual_panel(fitted, i))))
+    return side_by_side("fit", "velocities, measured and fitted, and residuals", columns)
 
 
 def _unit(observation: Observation, axis: int) -> str:

@@ -14,7 +14,10 @@ from galileo_jax.results.command_line import command_line
 from galileo_jax.results.run import CLIP, Run
 from galileo_jax.results.shown import shown_parameters, unit_text
 
-MEANINGS = {
+MEANINGS = {  # by name; of those with a number in them, by pattern
+    r"m(\d+)": "mass of object {}",
+    r"k(\d+)": "friction coefficient of object {}",
+    r"mass_ratio_(\d+)_(\d+)": "m{} / m{}",
     "mass_ratio": "m1 / m2",
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
@@ -28,6 +31,8 @@ MEANINGS = {
     "floor_grip": "share of the speed along the floor that is lost in a bounce",
     "wall_restitution": "share of the speed against a wall left after a bounce",
     "wall_grip": "most of the impulse along a wall, over that against it",
+    r"wall_offset_from(\d+)": "first end of wall {}, to the left of where it is declared",
+    r"wall_offset_to(\d+)": "second end of wall {}, to the left of where it is declared",
     "period": "period of the swing without damping",
     "damping": "rate at which the swing dies away",
     "rest": "position of rest, below the first frame's",
@@ -40,40 +45,20 @@ MEANINGS = {
     "declared_scale": "relative error of the scale: lengths are measured too long by this share",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
+    r"impact_momentum_object(\d+)": (
+        "momentum that object {} gains in its hit, over what is lost to it"
+    ),
     "contact_gap": "by how much further apart the objects are when they touch again",
     "release_instant": "time of the release after the first frame",
+    r"start_offset_object(\d+)": "start of object {}, from where it was marked",
     "noise_scale": "tracking noise divided by the stated one",
 }
-OF_OBJECTS = (  # what parameters' names with numbers in them mean
-    (re.compile(r"m(\d+)"), "mass of object {}"),
-    (re.compile(r"k(\d+)"), "friction coefficient of object {}"),
-    (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
-    (
-        re.compile(r"wall_offset_from(\d+)"),
-        "first end of wall {}, to the left of where it is declared",
-    ),
-    (
-        re.compile(r"wall_offset_to(\d+)"),
-        "second end of wall {}, to the left of where it is declared",
-    ),
-    (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
-    (
-        re.compile(r"impact_momentum_object(\d+)"),
-        "momentum that object {} gains in its hit, over what is lost to it",
-    ),
-)
-OUTSIDE = (  # what nuisances mean that are far from what is usual
-    (re.compile(r"impact_restitution"), "the objects bounce, with a restitution of {value:.2f}"),
-    (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
-    (
-        re.compile(r"release_instant(?:_\d+)?"),
-        "object 1 is released {size:.0f} ms {side} the first frame",
-    ),
-    (
-        re.compile(r"start_offset_object(\d+)(?:_\d+)?"),
-        "object {} starts {size:.1f} mm from where it was marked",
-    ),
-)
+OUTSIDE = {  # what nuisances mean that are far from what is usual
+    "impact_restitution": "the objects bounce, with a restitution of {value:.2f}",
+    "foot_transition": "the foot of the ramp multiplies the speed by {value:.3f}",
+    r"release_instant(?:_\d+)?": "object 1 is released {size:.0f} ms {side} the first frame",
+    r"start_offset_object(\d+)(?:_\d+)?": "object {} starts {size:.1f} mm from where it was marked",
+}
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD = 0.7
 TOLD_FACTOR = 10.0  # an interval that spans more tells no size
@@ -83,21 +68,25 @@ PATTERNS = "galileo compare tests whether it has a pattern"
 
 def meaning(name: str) -> str | None:
     """What a parameter is, in a phrase; None where its name says it (effects)."""
-    for pattern, phrase in OF_OBJECTS:
-        if found := pattern.fullmatch(name):
-            return phrase.format(*found.groups())
     if name.endswith(SUFFIX):
         return f"{name.removesuffix(SUFFIX)} / m1"
-    return MEANINGS.get(name)
+    return _phrase(MEANINGS, name)
+
+
+def _phrase(phrases: Mapping[str, str], name: str, **values: object) -> str | None:
+    for pattern, phrase in phrases.items():
+        if found := re.fullmatch(pattern, name):
+            return phrase.format(*found.groups(), **values)
+    return None
 
 
 def undetermined(run: Run, fitted: PosteriorPredictive) -> dict[str, str]:
     """Why the clip does not determine a main parameter, by the name of each such parameter."""
-    found = {}
-    for name, entry in shown_parameters(run.result).items():
-        if not entry["identified"] and name != "phi":
-            found[name] = _reason(name, run, fitted)
-    return found
+    return {
+        name: _reason(name, run, fitted)
+        for name, entry in shown_parameters(run.result).items()
+        if not entry["identified"] and name != "phi"
+    }
 
 
 def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
@@ -128,9 +117,9 @@ def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
         return f"only its ratio to the mass is determined ({name}{SUFFIX}); declare mass_kg"
     if name in FORCES and run.clip.objects[0].mass_kg is None:
         return "only its ratio to the mass is determined; declare mass_kg"
-    if name == "pixels_per_metre" and not surroundings.has_surface:
-        return "this motion is the same at any scale"
     if name == "pixels_per_metre":
+        if not surroundings.has_surface:
+            return "this motion is the same at any scale"
         return (
             "a single slope determines only scale * (sin a - k1 cos a); "
             "declare pixels_per_metre to get the friction"
@@ -224,14 +213,11 @@ def _of_chi2(error: Mapping[str, Any]) -> str:
 def pull_text(pull: Mapping[str, Any]) -> str:
     """What a nuisance outside its prior says of the clip, in a sentence."""
     name, value = str(pull["parameter"]), float(pull["value"])
-    text = f"{meaning(name) or name} is {value:.3g}{unit_text(pull)}"
-    for pattern, phrase in OUTSIDE:
-        if found := pattern.fullmatch(name):
-            side = "before" if value < 0 else "after"
-            text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
+    said = {"value": value, "size": 1e3 * abs(value), "side": "before" if value < 0 else "after"}
+    plain = f"{meaning(name) or name} is {value:.3g}{unit_text(pull)}"
     return (
-        f"{sentence(text)[:-1]}, {abs(pull['z']):.0f} standard deviations from the expected value; "
-        "galileo diagnose looks for the cause."
+        f"{sentence(_phrase(OUTSIDE, name, **said) or plain)[:-1]}, {abs(pull['z']):.0f} standard "
+        "deviations from the expected value; galileo diagnose looks for the cause."
     )
 
 
@@ -255,15 +241,17 @@ def convergence(run: Run) -> str:
     return f"{word}: {text}."
 
 
-def caution(result: dict[str, Any]) -> str | None:
-    """Why the intervals are not credible intervals, where they are not."""
+def cautions(result: Mapping[str, Any]) -> list[str]:
+    """What the fit warns of; first, where its intervals are not credible ones, why."""
+    found = list(result.get("warnings", []))
     if result.get("preset") != "thesis":
-        return None
+        return found
     best = ", ".join(f"{name} = {value:.4g}" for name, value in result.get("best", {}).items())
-    return (
+    return [
         f"Made with the sampler of the thesis; its estimate is {best or 'its best sample'}. "
-        "Its draws are not a posterior: means and intervals here only describe the chains."
-    )
+        "Its draws are not a posterior: means and intervals here only describe the chains.",
+        *found,
+    ]
 
 
 def fit_command(run: Run) -> str:

@@ -4,15 +4,16 @@ import base64
 import contextlib
 import gzip
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib import resources
 from importlib.metadata import version
+from pathlib import Path
 
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.plotly_figure import figure, to_json
-from galileo_jax.runtime.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing, write_text
 from galileo_jax.runtime.jax_setup import cache_folder
 
 NO_SCRIPT = (
@@ -21,22 +22,48 @@ NO_SCRIPT = (
 )
 
 
-def document(title: str, sections: Iterable[str]) -> str:
-    """A whole page; `sections` are HTML, the first its header.
+class Html(str):
+    """Text that is HTML already; a cell of a table that is not is escaped."""
 
-    Every `<h2>` is an entry of the page's contents. Plotly is inlined, compressed (2 MB), where
-    there is a chart.
+    __slots__ = ()
+
+
+def write_page(
+    path: Path,
+    kind: str,
+    title: str,
+    lead: str,
+    sections: Iterable[str],
+    more: str = "",
+    is_good: bool = True,
+) -> Path:
+    """Writes a page and returns its path.
+
+    Every `<h2>` is an entry of its contents. Plotly is inlined, compressed (2 MB), where there is
+    a chart.
+
+    Args:
+      path: where to.
+      kind: what it is, such as "comparison".
+      title: of which clips.
+      lead: the result in one sentence.
+      sections: HTML; empty ones are left out.
+      more: HTML below the sentence.
+      is_good: whether the sentence is good news.
     """
-    header, *rest = sections
-    contents, body = _with_anchors("\n".join(rest))
-    script = _asset("page.js")
-    return with_plotly(
+    contents, body = _with_anchors("\n".join(filter(None, sections)))
+    page = (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{_asset('page.css')}</style>\n</head>\n<body>\n"
-        f"<header>\n{header}\n{contents}\n{NO_SCRIPT}</header>\n<main>\n{body}\n</main>\n"
-        f"<script>{script}</script>\n</body>\n</html>\n"
+        f"<title>{escape(f'{title}: {kind}')}</title>\n<style>{_asset('page.css')}</style>\n"
+        f'</head>\n<body>\n<header>\n<p class="eyebrow">galileo · {escape(kind)}</p>\n'
+        f"<h1>{escape(title)}</h1>\n"
+        f'<p class="lead{"" if is_good else " warn"}">{escape(lead)}</p>\n{more}\n'
+        f"{contents}\n{NO_SCRIPT}</header>\n<main>\n{body}\n</main>\n"
+        f"<script>{_asset('page.js')}</script>\n</body>\n</html>\n"
     )
+    write_text(path, with_plotly(page))
+    return path
 
 
 def with_plotly(page: str) -> str:
@@ -48,16 +75,25 @@ def with_plotly(page: str) -> str:
     return f"{before}</main>\n{script}{after}"
 
 
-def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = True) -> str:
-    """The top of a page: what it is, of which clips, and the result in one sentence.
+def section(heading: str, *parts: str) -> str:
+    """A heading over parts that are HTML; empty where all of them are."""
+    body = "\n".join(filter(None, parts))
+    return f"<h2>{escape(heading)}</h2>\n{body}" if body else ""
 
-    `more`: HTML below the sentence. `is_good`: whether that is good news.
-    """
-    warn = "" if is_good else " warn"
-    return (
-        f'<p class="eyebrow">galileo · {escape(kind)}</p>\n<h1>{escape(title)}</h1>\n'
-        f'<p class="lead{warn}">{escape(lead)}</p>\n{more}'
-    )
+
+def prose(text: str, look: str = "") -> str:
+    """A paragraph of plain text; `look`: "soft", "warn"."""
+    return f'<p class="{look}">{escape(text)}</p>' if look else f"<p>{escape(text)}</p>"
+
+
+def link(text: str, place: str) -> Html:
+    """A link to another page."""
+    return Html(f'<a href="{escape(place, quote=True)}">{escape(text)}</a>')
+
+
+def code(text: str) -> Html:
+    """Names and commands."""
+    return Html(f"<code>{escape(text)}</code>")
 
 
 def chart_element(chart: Chart) -> str:
@@ -73,29 +109,23 @@ def chart_element(chart: Chart) -> str:
 
 
 def chart_section(
-    heading: str,
-    caption: str,
-    charts: Iterable[Chart],
-    arrangement: str = "grid",
-    legend: str = "",
+    heading: str, caption: str, charts: Iterable[Chart], arrangement: str = "grid", key: str = ""
 ) -> str:
-    """A heading, a caption and charts.
+    """A heading, a caption, what the marks mean, and charts.
 
     `arrangement`: "grid", side by side where there is room, or "stack", one below the other.
     """
     drawn = "".join(map(chart_element, charts))
-    return (
-        f"<h2>{escape(heading)}</h2>\n<figure><figcaption>{escape(caption)}</figcaption>"
-        f'{legend}<div class="{arrangement}">{drawn}</div></figure>'
-    )
+    figure = f"<figure><figcaption>{escape(caption)}</figcaption>{key}"
+    return section(heading, f'{figure}<div class="{arrangement}">{drawn}</div></figure>')
 
 
 def legend(entries: Iterable[tuple[str, str, str]]) -> str:
     """What the marks mean.
 
     Args:
-      entries: (kind of key, colour of the style sheet, meaning); kinds: line, dashed, dot, ring,
-        fill, cross.
+      entries: (kind of key, colour of the style sheet, meaning); kinds: line, dashed, dot, fill,
+        cross.
     """
     listed = "".join(
         f'<li><span class="key {kind}" style="color:var(--{colour})"></span>{escape(text)}</li>'
@@ -110,19 +140,20 @@ def details(summary: str, inner: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], only_wide: Sequence[str] = ()) -> str:
-    """A table of cells that are HTML already; columns `only_wide` are left out on a phone."""
+    """A table of plain text and `Html`; columns `only_wide` are left out on a phone."""
     kinds = ["n wide" if name in only_wide else "n" for name in head]
-    top = "".join(
-        f'<th scope="col" class="{kind}">{escape(name)}</th>'
-        for name, kind in zip(head, kinds, strict=True)
-    )
-    body = "".join(
-        "<tr>"
-        + "".join(f'<td class="{k}">{cell}</td>' for cell, k in zip(row, kinds, strict=True))
-        + "</tr>"
-        for row in rows
-    )
-    return f'<div class="table"><table><tr>{top}</tr>{body}</table></div>'
+    lines = []
+    for tag, row in (('th scope="col"', head), *(("td", row) for row in rows)):
+        cells = (one if isinstance(one, Html) else escape(one) for one in row)
+        line = (f'<{tag} class="{k}">{c}</{tag[:2]}>' for c, k in zip(cells, kinds, strict=True))
+        lines.append(f"<tr>{''.join(line)}</tr>")
+    return f'<div class="table"><table>{"".join(lines)}</table></div>'
+
+
+def listing(entries: Mapping[str, str]) -> str:
+    """Names with what they stand for, plain text or `Html`."""
+    cells = {k: v if isinstance(v, Html) else escape(v) for k, v in entries.items()}
+    return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{v}</dd>' for k, v in cells.items())}</dl>"
 
 
 def items(entries: Iterable[str]) -> str:
@@ -160,13 +191,9 @@ def _plotly() -> str:
     if path is not None:
         with contextlib.suppress(OSError):
             return path.read_text("ascii")
-    packed = _packed_plotly()
+    script = resources.files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
+    packed = base64.b64encode(gzip.compress(script, 6, mtime=0)).decode("ascii")
     if path is not None:  # a cache that cannot be written is no reason to stop
         with contextlib.suppress(OSError), replacing(path) as temporary:
             temporary.write_text(packed, "ascii")
     return packed
-
-
-def _packed_plotly() -> str:
-    script = resources.files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    return base64.b64encode(gzip.compress(script, 6, mtime=0)).decode("ascii")

@@ -32,23 +32,31 @@ def paragraph(
         name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO
     }
     known = {name: entry for name, entry in entries.items() if entry["identified"]}
-    effects = {name: entry for name, entry in known.items() if _is_of(name, result["effects"])}
+    effects = {
+        name: entry
+        for name, entry in known.items()
+        if any(name == one or name.startswith(f"{one}_") for one in result["effects"])
+    }
     rest = {
         name: entry
         for name, entry in known.items()
         if name not in effects and not FRICTION.fullmatch(name) and not RATIO.fullmatch(name)
     }
     body = BODIES.get(shapes[0], "body") if shapes else "body"
+    status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
+    model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
+    near = ", ".join(nearness(result["error"]))
+    is_one_of_several = status == "ambiguous" and result["effects"]
     said = [
         _frictions(known, body, shapes),
-        *(_ratio(name, entry, body) for name, entry in known.items() if RATIO.fullmatch(name)),
+        *_ratios(known, body),
         _values(rest),
         _unknown([name for name in entries if name not in known], known),
-        _nearness(result["error"], _model(result, diagnosis)),
-        *_imperfections(result),
+        f"The model{model} follows the motion to {near}." if near else "",
+        *(imperfection_text(found) if (found := result.get("imperfections")) else []),
         _verdict(result, check, diagnosis),
-        "" if _status(diagnosis) == "law" else _values(effects),  # the law's text has them
-        _only_if(result, diagnosis),
+        "" if status == "law" else _values(effects),  # the law's text has them
+        f"All values are those with {_all(result)}." if is_one_of_several else "",
         _unseen(check, diagnosis),
     ]
     return " ".join(filter(None, said))
@@ -57,6 +65,10 @@ def paragraph(
 def _words(name: str) -> str:
     """An effect's name in words."""
     return name.replace("_", " ")
+
+
+def _all(result: Mapping[str, Any]) -> str:
+    return listed([_words(one) for one in result["effects"]])
 
 
 def _value(entry: Mapping[str, Any]) -> str:
@@ -69,31 +81,30 @@ def _unit(unit: str) -> str:
     return f" {plain}" if plain else ""
 
 
+def _who(number: str, body: str) -> str:
+    return f"the {body}" if number == "1" else f"object {number}"
+
+
 def _frictions(known: Mapping[str, Any], body: str, shapes: Sequence[str]) -> str:
     """How the bodies slid."""
-    found = {int(m[1]): entry for name, entry in known.items() if (m := FRICTION.fullmatch(name))}
-    if not found:
-        return ""
-    parts = []
-    for number, entry in found.items():
-        round_one = number <= len(shapes) and shapes[number - 1] != "box"
-        who = f"the {body}" if number == 1 else f"object {number}"
-        verb = f"{who} {'moved' if round_one else 'slid'} with a friction coefficient of"
-        value = _value(entry)
-        parts.append(f"{who} with {value}" if parts else f"{verb} {value}")
-    return sentence(", ".join(parts))
+    found = [(m[1], entry) for name, entry in known.items() if (m := FRICTION.fullmatch(name))]
+    parts: list[str] = []
+    for number, entry in found:
+        is_round = int(number) <= len(shapes) and shapes[int(number) - 1] != "box"
+        verb = f"{'moved' if is_round else 'slid'} with a friction coefficient of"
+        parts.append(f"{_who(number, body)} {'with' if parts else verb} {_value(entry)}")
+    return sentence(", ".join(parts)) if parts else ""
 
 
-def _ratio(name: str, entry: Mapping[str, Any], body: str) -> str:
-    found = RATIO.fullmatch(name)
-    one, other = (found[1], found[2]) if found and found[1] else ("1", "2")
-    who = f"the {body}" if one == "1" else f"object {one}"
-    return sentence(f"{who} is {_value(entry)} times as heavy as object {other}")
-
-
-def _is_of(name: str, effects: Sequence[str]) -> bool:
-    """Whether a parameter, or what is derived from it, belongs to one of the effects."""
-    return any(name == effect or name.startswith(f"{effect}_") for effect in effects)
+def _ratios(known: Mapping[str, Any], body: str) -> list[str]:
+    """How heavy the bodies are beside each other."""
+    return [
+        sentence(
+            f"{_who(m[1] or '1', body)} is {_value(entry)} times as heavy as object {m[2] or '2'}"
+        )
+        for name, entry in known.items()
+        if (m := RATIO.fullmatch(name))
+    ]
 
 
 def _values(entries: Mapping[str, Any]) -> str:
@@ -114,33 +125,8 @@ def _called(name: str) -> str:
 
 def _unknown(names: Sequence[str], known: Mapping[str, Any]) -> str:
     """What the clip does not determine; a force that is known per mass counts as known."""
-    open_ones = [name for name in names if f"{name}{SUFFIX}" not in known]
-    if not open_ones:
-        return ""
-    return f"This clip does not determine {listed([f'the {_called(name)}' for name in open_ones])}."
-
-
-def _status(diagnosis: Mapping[str, Any] | None) -> str:
-    return "" if diagnosis is None else str(diagnosis["verdict"]["status"])
-
-
-def _model(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
-    """What the model is called that the values are of."""
-    if not result["effects"]:
-        return "The model"
-    effects = listed([_words(one) for one in result["effects"]])
-    return f"The model with {'a law' if _status(diagnosis) == 'law' else effects}"
-
-
-def _nearness(error: Mapping[str, Any], model: str) -> str:
-    """How near the model comes to what was seen."""
-    sizes = nearness(error)
-    return f"{model} follows the motion to {', '.join(sizes)}." if sizes else ""
-
-
-def _imperfections(result: Mapping[str, Any]) -> list[str]:
-    found = result.get("imperfections")
-    return imperfection_text(found) if found else []
+    open_ones = [f"the {_called(name)}" for name in names if f"{name}{SUFFIX}" not in known]
+    return f"This clip does not determine {listed(open_ones)}." if open_ones else ""
 
 
 def _verdict(
@@ -158,13 +144,6 @@ def _verdict(
     return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
 
 
-def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
-    """That the values hang on one of several explanations."""
-    if _status(diagnosis) != "ambiguous" or not result["effects"]:
-        return ""
-    return f"All values are those with {listed([_words(one) for one in result['effects']])}."
-
-
 def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
     """The smallest strengths that would have shown, of the likeliest of all other effects."""
     found = (diagnosis or check).get("could_not_see") or {}
@@ -173,11 +152,11 @@ def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> st
         in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
         asked = [row["effect"] for row in diagnosis["candidates"]]
     told = [name for name in asked if name not in in_question and name in found]
-    parts = [_too_weak(name, **found[name]) for name in told[:MOST_UNSEEN]]
+    parts = []
+    for name in told[:MOST_UNSEEN]:
+        strength, unit = found[name]["strength"], _unit(found[name]["unit"])
+        size = "of any usual strength"
+        if strength is not None:
+            size = f"below {float(f'{strength:.2g}'):g}{unit}"
+        parts.append(f"{_words(name)} {size}")
     return sentence(f"{listed(parts)} could not have been seen") if parts else ""
-
-
-def _too_weak(name: str, strength: float | None, unit: str) -> str:
-    if strength is None:
-        return f"{_words(name)} of any usual strength"
-    return f"{_words(name)} below {float(f'{strength:.2g}'):g}{_unit(unit)}"

@@ -1,24 +1,27 @@
-"""The results of a prediction: lines for the terminal, and its section of the report."""
+"""The results of a prediction: lines for the terminal, its chart, its section of the report."""
 
-import base64
 import re
 from collections.abc import Mapping
-from html import escape
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.report.chart import Chart
+import numpy as np
+
+from galileo_jax.prediction.extrapolate import Motions, as_measured
+from galileo_jax.report import html_page as html
+from galileo_jax.report.chart import Band, Chart, Line, Panel, Points
 from galileo_jax.report.fit_page import PAGE
-from galileo_jax.report.html_page import chart_section, document, header, legend, table, with_plotly
 from galileo_jax.report.phrases import sentence
 from galileo_jax.report.style import object_colour
+from galileo_jax.report.video_frames import data_uri
 from galileo_jax.results.run import Run
 from galileo_jax.runtime.atomic_write import write_text
 
 LEAST_M = 5e-4  # of motion after the clip; less is not mentioned
 OVER = "everything is at rest when the clip ends and stays at rest: these values describe the clip"
 ALONE = "prediction.html"  # where there is no report to go into
+STEP_S = 1 / 60  # between points of the curve
 
 
 def prediction_lines(run: Run, found: Mapping[str, Any]) -> list[str]:
@@ -100,13 +103,9 @@ def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], chart: Ch
     if page.is_file() and "</main>" in (text := page.read_text(encoding="utf-8")):
         write_text(page, _inserted(text, section))
         return page
-    page = folder / ALONE
     title = ", ".join(Path(clip).name for clip in run.result["clips"])
     until = f"Until {found['predicted_until_s']:.2f} s after the first frame."
-    write_text(
-        page, document(f"{title}: prediction", [header("prediction", title, until), section])
-    )
-    return page
+    return html.write_page(folder / ALONE, "prediction", title, until, [section])
 
 
 def _inserted(page: str, section: str) -> str:
@@ -114,27 +113,26 @@ def _inserted(page: str, section: str) -> str:
     if 'href="#prediction"' not in page:
         page = page.replace("</nav>", '<a href="#prediction">Prediction</a></nav>', 1)
     before, after = page.rsplit("</main>", 1)
-    return with_plotly(f"{before}{section}</main>{after}")
+    return html.with_plotly(f"{before}{section}</main>{after}")
 
 
 def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -> str:
     answers = {name: _answers(run, entry) for name, entry in found["objects"].items()}
     columns = dict.fromkeys(chain.from_iterable(answers.values()))
     rows = [
-        [f"<code>{escape(name)}</code>", *(own.get(question, "") for question in columns)]
+        [html.code(name), *(own.get(question, "") for question in columns)]
         for name, own in answers.items()
     ]
-    hit = f"<p>{escape(sentence(_hit(found)))}</p>\n" if found["hit"] is not None else ""
-    over = f"<p>{sentence(OVER)}</p>\n" if is_over(found) else ""
-    encoded = base64.b64encode(picture).decode("ascii")
-    stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
-    motion = chart_section(
+    hit = f"{html.prose(sentence(_hit(found)))}\n" if found["hit"] is not None else ""
+    over = f"{html.prose(sentence(OVER))}\n" if is_over(found) else ""
+    stills = f'<img src="{data_uri("png", picture)}" style="max-width:100%" alt="the stills">'
+    motion = html.chart_section(
         "Prediction",
         f"{found['seconds_beyond_clip_s']:g} s beyond the clip's end, from {found['num_draws']} "
         "draws of the posterior: mean and 95 % interval.",
         [chart],
         "stack",
-        legend(
+        html.legend(
             [
                 ("dot", "ink", "measured"),
                 *(("line", object_colour(i), f"{name}, median") for i, name in enumerate(answers)),
@@ -145,6 +143,39 @@ def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -
     )
     caption = "First and last frame of the clip, filmed and simulated, and the predicted end."
     return (
-        f'<section id="prediction">\n{motion}\n{over}{table(("", *columns), rows)}\n{hit}'
+        f'<section id="prediction">\n{motion}\n{over}{html.table(("", *columns), rows)}\n{hit}'
         f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"
     )
+
+
+def prediction_chart(run: Run, motions: Motions) -> Chart:
+    """Every object's x against time, with 95 % bands, during the clip and beyond.
+
+    Without a surface it is the height: of most such motions x says little.
+    """
+    observation = run.problem.observation
+    clip_end_s = float(observation.times_s[-1])
+    stride = max(1, round(STEP_S / (motions.times_s[1] - motions.times_s[0])))
+    times = motions.times_s[::stride]
+    axis = 0 if run.problem.model.scene.surroundings.has_surface else 1
+    shown = as_measured(run.problem.model, motions)[:, :, axis, ::stride]
+    marks = []
+    for i, name in enumerate(observation.names):
+        low, median, high = np.quantile(shown[:, i], [0.025, 0.5, 0.975], axis=0)
+        colour, during = object_colour(i), times <= clip_end_s
+        marks += [
+            Band(times, low, high, colour, "", 0.25),
+            Line(times[during], median[during], colour, name),
+            Line(times[~during], median[~during], colour, "", is_dashed=True),
+            Points(observation.times_s, observation.position_m[i, axis], "ink", "measured",
+                   size_px=3.3),
+        ]  # fmt: skip
+    panel = Panel(
+        ylabel=("x, m", "y, m")[axis],
+        marks=tuple(marks),
+        title="Measured (dots), median and 95 % of the posterior",
+        xlabel="time, s",
+        divider=(clip_end_s, "end of the clip"),
+    )
+    label = f"measured and predicted {('x', 'y')[axis]} against time"
+    return Chart("prediction", label, (panel,), run.problem.name, panel_px=290)

@@ -12,7 +12,7 @@ import yaml
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.files.package_data import scene_path
-from galileo_jax.report.html_page import details
+from galileo_jax.report import html_page as html
 
 PACKAGES = ("jax", "jaxlib", "mujoco", "numpy", "scipy", "opencv-python-headless")
 
@@ -23,27 +23,31 @@ def provenance(command: str, clips: Iterable[Clip], facts: Mapping[str, str]) ->
     `facts`: more, plain text: engine, seed, timings, ...
     """
     clips = tuple(clips)
-    entries = {
-        "command": f"<code>{escape(command)}</code>",
-        **{key: escape(value) for key, value in facts.items()},
-        "versions": escape(", ".join(f"{name} {found}" for name, found in versions().items())),
-    }
-    for path in inputs(clips):
-        entries[escape(path.name)] = f'<code title="SHA-256">{digest(path)}</code>'
-    listed = "".join(f"<dt>{key}</dt><dd>{value}</dd>" for key, value in entries.items())
+    kept, options = set(ClipFile.model_fields), {"sort_keys": False, "default_flow_style": None}
     declared = "\n---\n".join(
-        yaml.safe_dump(
-            clip.model_dump(mode="json", include=set(ClipFile.model_fields), exclude_none=True),
-            sort_keys=False,
-            default_flow_style=None,
-        )
+        yaml.safe_dump(clip.model_dump(mode="json", include=kept, exclude_none=True), **options)
         for clip in clips
     )
-    return (
-        "<h2>Provenance</h2>\n<p>Inputs are identified by their SHA-256: the same hashes, versions "
-        f"and seed give the same page.</p>\n<dl>{listed}</dl>\n"
-        + details("The declaration of the clip", f"<pre>{escape(declared)}</pre>")
+    hashes = {
+        path.name: html.Html(f'<code title="SHA-256">{digest(path)}</code>')
+        for path in inputs(clips)
+    }
+    return html.section(
+        "Provenance",
+        html.prose(
+            "Inputs are identified by their SHA-256: the same hashes, versions and seed give the "
+            "same page."
+        ),
+        html.listing(
+            {"command": html.code(command), **facts, "versions": versions_text(), **hashes}
+        ),
+        html.details("The declaration of the clip", f"<pre>{escape(declared)}</pre>"),
     )
+
+
+def versions_text() -> str:
+    """All versions in one line."""
+    return ", ".join(f"{name} {found}" for name, found in versions().items())
 
 
 def versions() -> dict[str, str]:

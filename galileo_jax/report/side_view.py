@@ -1,25 +1,34 @@
 """The scene drawn from the side: which part of it is shown, and the shapes in it.
 
-`animation.py` moves the shapes in a page; `draw_still` makes a picture of them.
+`animation.py` moves the shapes in a page; `write_first_and_last` makes a picture of them.
 """
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.scene.scene import Scene
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
-from galileo_jax.report.style import object_colour, palette
+from galileo_jax.prediction.extrapolate import Motions, as_measured
+from galileo_jax.report.style import matplotlib_style, object_colour, palette
+from galileo_jax.report.video_frames import first_and_last_frame
+from galileo_jax.results.run import Run
 from galileo_jax.rollout.motion import pitch
+from galileo_jax.runtime.atomic_write import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LARGEST_PX = 960
 MARGIN_M = 0.08
 SLAB_M = 0.012  # how thick ramp and table are drawn
 RAIL_M = 0.001  # half a wall's width, seen from above
 CIRCLE_CORNERS = 72
-SUBPIXEL_BITS = 4
+COLUMN_IN, TITLE_IN = 4.8, 0.3  # of the picture
 
 
 @dataclass(frozen=True)
@@ -45,24 +54,22 @@ def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
     """What the video shows; without a video all of `positions_m` `[..., 2, frame]`, but for NaN."""
     # As in `observe`: without a declared foot the first object's first place is the origin.
     origin = clip.origin_px or clip.objects[0].point_px if clip.is_camera_plain else None
+    is_mirrored = clip.direction == "left"
     if clip.frame_size_px and origin:
         (width, height), (x, y) = clip.frame_size_px, origin
         scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
-        left, right = -x / scale, (width - x) / scale
+        left, right = (-x / scale, (width - x) / scale)
+        if is_mirrored:
+            left, right = -right, -left
         bottom, top = (y - height) / scale, y / scale
         enlarge = min(1.0, LARGEST_PX / max(width, height))
     else:
         places = np.moveaxis(positions_m, -2, -1).reshape(-1, 2)
         reach = MARGIN_M + max(scene.surroundings.half_length_m)
-        (left, bottom), (right, top) = (
-            np.nanmin(places, axis=0) - reach,
-            np.nanmax(places, axis=0) + reach,
-        )
+        left, bottom = np.nanmin(places, axis=0) - reach
+        right, top = np.nanmax(places, axis=0) + reach
         width, height = right - left, top - bottom
         enlarge = LARGEST_PX / max(width, height)
-    is_mirrored = clip.direction == "left"
-    if is_mirrored and clip.frame_size_px and origin:
-        left, right = -right, -left
     size = (2 * round(width * enlarge / 2), 2 * round(height * enlarge / 2))
     return View(float(left), float(right), float(bottom), float(top), *size, is_mirrored)
 
@@ -116,32 +123,57 @@ def outline(clip: Clip, scene: Scene, index: int) -> np.ndarray:
     return np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length, height)
 
 
-def draw_still(clip: Clip, scene: Scene, view: View, position_m: np.ndarray) -> np.ndarray:
-    """A picture of the objects with their centres at `position_m` `[object, 2]`.
-
-    Returns:
-      `[height, width, 3]`, uint8 RGB.
-    """
-    picture = np.empty((view.height_px, view.width_px, 3), np.uint8)
-    picture[:] = _rgb("card")
+def draw_still(axes: "Axes", clip: Clip, scene: Scene, view: View, position_m: np.ndarray) -> None:
+    """Draws the objects with their centres at `position_m` `[object, 2]`."""
     for slab in surfaces(scene, view):
-        _fill(picture, view, slab, "surface")
+        axes.fill(*slab.T, color=palette()["surface"], linewidth=0)
     turned = pitch(position_m, scene.surroundings)
     for i, (centre, angle) in enumerate(zip(position_m, map(float, turned), strict=True)):
         cos, sin = math.cos(angle), math.sin(angle)
         corners = outline(clip, scene, i) @ np.array([[cos, sin], [-sin, cos]]) + centre
-        _fill(picture, view, corners, object_colour(i))
-    return picture[:, ::-1] if view.is_mirrored else picture
+        axes.fill(*corners.T, color=palette()[object_colour(i)], linewidth=0)
+    ends = (view.left_m, view.right_m)
+    axes.set(xlim=ends[::-1] if view.is_mirrored else ends, ylim=(view.bottom_m, view.top_m))
+    axes.set(facecolor=palette()["card"], aspect="equal")
 
 
-def _fill(picture: np.ndarray, view: View, corners_m: np.ndarray, colour: str) -> None:
-    import cv2
+def write_first_and_last(run: Run, motions: Motions, path: Path) -> None:
+    """Writes a PNG: first and last frame of the clip beside the simulated ones, and the end.
 
-    scale = view.width_px / (view.right_m - view.left_m)
-    pixels = scale * (corners_m - (view.left_m, view.top_m)) * (1, -1) - 0.5
-    fixed = np.round(pixels * 2**SUBPIXEL_BITS).astype(np.int32)
-    cv2.fillPoly(picture, [fixed], _rgb(colour), cv2.LINE_AA, SUBPIXEL_BITS)
+    The frames of the video, where there is one, are on the left.
+    """
+    from matplotlib.figure import Figure
 
-
-def _rgb(colour: str) -> tuple[int, ...]:
-    return tuple(bytes.fromhex(palette()[colour][1:]))
+    clip, scene = run.clip, run.problem.model.scene
+    median = np.median(as_measured(run.problem.model, motions), axis=0)
+    clip_end_s = float(run.problem.observation.times_s[-1])
+    last = int(np.searchsorted(motions.times_s, clip_end_s - 1e-9))
+    view = view_of(clip, scene, median)
+    stills = {
+        "simulated, first frame": 0,
+        f"simulated, last frame ({clip_end_s:.2f} s)": last,
+        f"predicted, {motions.times_s[-1]:.2f} s": -1,
+    }
+    frames = first_and_last_frame(clip.video) if clip.video else []
+    shapes = [(view.height_px, view.width_px), *(frame.shape for frame in frames)]
+    row_in = COLUMN_IN * max(height / width for height, width, *_ in shapes) + TITLE_IN
+    columns = 2 if frames else 1
+    with matplotlib_style("first_and_last"), replacing(path) as temporary:
+        figure = Figure(figsize=(COLUMN_IN * columns, row_in * len(stills)), dpi=130)
+        grid = figure.subplots(len(stills), columns, squeeze=False)
+        top = 1 - TITLE_IN / (row_in * len(stills))
+        figure.subplots_adjust(0.01, 0.01, 0.99, top, 0.03, 0.16)
+        for axes in grid.flat:
+            axes.set(xticks=[], yticks=[])
+            axes.spines[:].set(visible=True, alpha=0.3)
+        for axes, (title, index) in zip(grid[:, -1], stills.items(), strict=True):
+            draw_still(axes, clip, scene, view, median[..., index])
+            axes.set(title=title)
+        if frames:
+            titles = ("first frame", "last frame")
+            for axes, title, frame in zip(grid[:, 0], titles, frames, strict=False):
+                axes.imshow(frame)
+                axes.set(title=title)
+            for axes in grid[len(frames) :, 0]:
+                axes.set_axis_off()
+        figure.savefig(temporary)

@@ -3,10 +3,11 @@
 It needs no truth and adds nothing up: it is for whoever filmed the clips, such as a class.
 """
 
-import base64
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -15,9 +16,10 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
+from galileo_jax.report import html_page as html
 from galileo_jax.report.fit_text import fits, meaning, nearness
 from galileo_jax.report.style import object_colour
-from galileo_jax.report.video_frames import jpeg
+from galileo_jax.report.video_frames import data_uri, jpeg
 from galileo_jax.results.shown import (
     HEADLINES,
     headlines,
@@ -31,10 +33,11 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
 PICTURE_PX, QUALITY = 200, 70  # the longer side of a thumbnail, twice as large as it is shown
-DRAWING_PX = (100, 62)
+DRAWING_PX, MARGIN_PX = (100, 62), 6.0
 MOST_POINTS = 60  # of a drawn path
 APART = '<span class="apart" title="stands apart">◆</span>&nbsp;'
 SHORT = {"mass_ratio": "m1/m2"}  # headings of columns, where they are not the parameter's name
+IN_WORDS = {"mass_ratio": "mass of object 1 over mass of object 2"}
 Document = Mapping[str, Any]
 
 
@@ -78,15 +81,12 @@ def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
     """
     if clip.video is None:
         return None
-    wanted, picture = middle_frame(observation), None
+    wanted = middle_frame(observation)
     try:
-        for index, frame in enumerate(decode.frames(clip.video)):
-            picture = frame
-            if index >= wanted:
-                break
-    except InputError:  # a picture is no reason to fail
+        first = islice(decode.frames(clip.video), wanted + 1)
+        return jpeg(deque(first, maxlen=1)[0], PICTURE_PX, QUALITY)
+    except (InputError, IndexError):  # a picture is no reason to fail
         return None
-    return None if picture is None else jpeg(picture, PICTURE_PX, QUALITY)
 
 
 def middle_frame(observation: Observation) -> int:
@@ -94,7 +94,7 @@ def middle_frame(observation: Observation) -> int:
 
     Distances are summed over the objects. Without any motion: the middle of the track.
     """
-    position = np.where(observation.mask[:, None, :], observation.position_m, np.nan)
+    position = np.where(observation.mask[:, None], observation.position_m[:, :2], np.nan)
     away = np.zeros(position.shape[-1])
     for i, is_seen in enumerate(observation.mask):
         if is_seen.any():
@@ -110,7 +110,9 @@ def middle_frame(observation: Observation) -> int:
 
 
 def clips_section(rows: Sequence[ClipRow]) -> str:
-    """The table as HTML, with its heading."""
+    """The table as HTML, with its heading; empty without any."""
+    if not rows:
+        return ""
     values = [_values(row) for row in rows]
     columns = list(dict.fromkeys(name for each in values for name in each))
     columns.sort(key=lambda name: (not HEADLINES.fullmatch(name), "mass" in name))
@@ -122,85 +124,69 @@ def clips_section(rows: Sequence[ClipRow]) -> str:
         f'<th scope="col" class="{kinds.get(name, "")}">{escape(name)}</th>' for name in head
     )
     body = "".join(
-        _row(row, own, columns, len(more)) for row, own in zip(rows, values, strict=True)
+        _row(row, own, columns, has_remarks) for row, own in zip(rows, values, strict=True)
     )
-    meanings = [
-        f"{SHORT.get(name, name)}: {_meaning(name)}" for name in columns if _meaning(name) != name
-    ]
+    known = {name: IN_WORDS.get(name) or meaning(name) for name in columns}
+    meanings = [f"{SHORT.get(name, name)}: {what}" for name, what in known.items() if what]
     caption = "Each value with its 95 % interval. Off: root mean square of the fit's distance."
     if meanings:
         caption = f"{'; '.join(meanings)}. {caption}"
     if any(row.other_fits for row in rows):
         caption += " Values are those of the first fit of each clip, in the order of the config."
-    return (
-        f"<h2>Clip by clip</h2>\n<p>{escape(caption)}</p>\n"
-        f'<div class="table"><table class="clips"><thead><tr>{top}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
-    )
-
-
-def _meaning(name: str) -> str:
-    if name == "mass_ratio":
-        return "mass of object 1 over mass of object 2"
-    return meaning(name) or name
+    lines = f"<thead><tr>{top}</tr></thead><tbody>{body}</tbody>"
+    clips = f'<div class="table"><table class="clips">{lines}</table></div>'
+    return html.section("Clip by clip", html.prose(caption), clips)
 
 
 def _values(row: ClipRow) -> dict[str, Mapping[str, Any]]:
     """By name: frictions and mass ratios; of a motion that has none what it does determine."""
     if row.fit is not None:
         entries = {**row.fit["parameters"], **row.fit["derived"]}
-        best = point_estimate(row.fit)
-        for name in set(best) & set(entries):
-            entries[name] = {**entries[name], "mean": best[name], "sd": None, "identified": True}
-    elif row.diagnosis is not None:
-        last = row.diagnosis["history"][-1]
-        entries = {name: entry for name, entry in last.items() if isinstance(entry, Mapping)}
-    else:
-        return {}
-    return headlines(entries)
+        for name, best in point_estimate(row.fit).items():
+            if name in entries:
+                entries[name] = {**entries[name], "mean": best, "sd": None, "identified": True}
+        return headlines(entries)
+    last = row.diagnosis["history"][-1] if row.diagnosis is not None else {}
+    return headlines({name: entry for name, entry in last.items() if isinstance(entry, Mapping)})
 
 
-def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str], more: int) -> str:
-    """A row; it has `more` cells after its values."""
-    together = ""
+def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str], has_remarks: bool) -> str:
+    name, together = escape(row.name), ""
     if row.together_with:
-        others = escape(", ".join(row.together_with))
-        together = f'<span class="soft">fitted together with {others}</span>'
+        together = _soft(f"fitted together with {', '.join(row.together_with)}")
     cells = [
         f'<td class="picture">{_picture(row)}</td>',
-        f'<th scope="row">{APART if row.remark else ""}{escape(row.name)}{together}</th>',
+        f'<th scope="row">{APART if row.remark else ""}{name}{together}</th>',
     ]
     if row.fit is None and row.diagnosis is None:
         said = "; ".join(dict.fromkeys([*row.failures, *filter(None, [row.remark])]))
-        span = f'colspan="{len(columns) + more}"'
+        span = f'colspan="{len(columns) + 3 + has_remarks}"'
         cells.append(f'<td class="warn why" {span}>{escape(said or "Not computed yet.")}</td>')
     else:
-        for name in columns:
-            label = escape(SHORT.get(name, name), quote=True)
-            shown = _value(values[name]) if name in values else ""
-            kind = "value outside" if name in row.outside else "value"
+        for column in columns:
+            label = escape(SHORT.get(column, column), quote=True)
+            kind = "value outside" if column in row.outside else "value"
+            shown = _value(values[column]) if column in values else ""
             cells.append(f'<td class="{kind}" data-label="{label}">{shown}</td>')
+        first, *rest = (nearness(row.fit["error"]) if row.fit is not None else []) or [""]
+        off = " ".join([first, *map(_soft, rest)])
+        links = ", ".join(html.link(label, quote(path.as_posix())) for label, path in row.pages)
         cells.append(f'<td class="model">{_model(row)}</td>')
-        cells.append(f'<td class="value off" data-label="off">{_off(row)}</td>')
-        if more == 4:
-            cells.append(f'<td class="remark">{escape(row.remark)}</td>')
-        cells.append(f'<td class="pages">{_links(row)}</td>')
+        cells.append(f'<td class="value off" data-label="off">{off}</td>')
+        cells += [f'<td class="remark">{escape(row.remark)}</td>'] * has_remarks
+        cells.append(f'<td class="pages">{links}</td>')
     return f"<tr>{''.join(cells)}</tr>\n"
+
+
+def _soft(text: str) -> str:
+    return f'<span class="soft">{escape(text)}</span>'
 
 
 def _value(entry: Mapping[str, Any]) -> str:
     if not entry["identified"]:
-        return '<span class="soft">not determined</span>'
+        return _soft("not determined")
     value = escape(f"{shown(entry)}{unit_text(entry)}")
-    if not entry["sd"]:
-        return value
-    return f'{value} <span class="soft">{escape(interval_text(entry))}</span>'
-
-
-def _off(row: ClipRow) -> str:
-    """How near the fit comes; empty where that is not known."""
-    first, *rest = (nearness(row.fit["error"]) if row.fit is not None else []) or [""]
-    return "".join([first, *(f' <span class="soft">{size}</span>' for size in rest)])
+    return f"{value} {_soft(interval_text(entry))}" if entry["sd"] else value
 
 
 def _model(row: ClipRow) -> str:
@@ -209,77 +195,59 @@ def _model(row: ClipRow) -> str:
         verdict = row.diagnosis["verdict"]
         said, is_good = verdict_words(verdict), verdict["status"] in ("none", "named", "law")
         error = row.diagnosis["history"][-1]
-    elif row.check is not None and row.fit is not None:
-        error, is_good = row.fit["error"], bool(row.check["adequate"])
-        said = "none" if is_good else "no verdict"
     else:
         assert row.fit is not None
-        error, is_good = row.fit["error"], fits(dict(row.fit))
-        said = "fits" if is_good else "does not fit"
+        error = row.fit["error"]
+        is_good = fits(row.fit) if row.check is None else bool(row.check["adequate"])
+        good, bad = ("fits", "does not fit") if row.check is None else ("none", "no verdict")
+        said = good if is_good else bad
     mark = "" if is_good else ' class="warn"'
-    failed = ""
-    if row.failures:
-        failed = f'<span class="warn">{escape(row.failures[0])}</span>'
+    failed = f'<span class="warn">{escape(row.failures[0])}</span>' if row.failures else ""
     chi2 = number(error["chi2_per_dof"], 0.1)
-    return f'<b{mark}>{escape(said)}</b> <span class="soft">chi2 {chi2}</span>{failed}'
+    return f"<b{mark}>{escape(said)}</b> {_soft(f'chi2 {chi2}')}{failed}"
 
 
 def verdict_words(verdict: Mapping[str, Any]) -> str:
     """The effect that a diagnosis names, or what else it says, in a few words."""
-    status, effects = verdict["status"], verdict["effects"]
-    if status == "named":
-        return " and ".join(effects)
-    if status == "law":
-        return str(verdict["law"])
-    if status == "ambiguous":
-        return f"ambiguous: {', '.join(effects)}"
-    return "something unknown" if status == "unknown" else str(status)
-
-
-def _links(row: ClipRow) -> str:
-    return ", ".join(
-        f'<a href="{quote(path.as_posix())}">{escape(label)}</a>' for label, path in row.pages
-    )
+    status, effects = str(verdict["status"]), verdict["effects"]
+    words = {
+        "named": " and ".join(effects),
+        "law": str(verdict.get("law")),
+        "ambiguous": f"ambiguous: {', '.join(effects)}",
+        "unknown": "something unknown",
+    }
+    return words.get(status, status)
 
 
 def _picture(row: ClipRow) -> str:
     if row.picture is not None:
-        encoded = base64.b64encode(row.picture).decode("ascii")
         name = escape(row.name, quote=True)
-        return f'<img alt="a frame of {name}" src="data:image/jpeg;base64,{encoded}">'
+        return f'<img alt="a frame of {name}" src="{data_uri("jpeg", row.picture)}">'
     return "" if row.observation is None else _drawing(row.observation, row.name)
 
 
 def _drawing(observation: Observation, name: str) -> str:
     """The objects' paths, and where they end, to scale."""
-    width, height = DRAWING_PX
-    places = np.moveaxis(np.where(observation.mask[:, None], observation.position_m, np.nan), 1, -1)
+    size = np.array(DRAWING_PX)
+    places = np.moveaxis(observation.position_m[:, :2], 1, -1)
     seen = places[observation.mask]
     if not len(seen):
         return ""
     low, high = seen.min(axis=0), seen.max(axis=0)
-    margin = 6.0
-    scale = min(
-        (size - 2 * margin) / max(extent, 1e-6)
-        for size, extent in zip(DRAWING_PX, high - low, strict=True)
-    )
-    centre = (low + high) / 2
+    scale = np.min((size - 2 * MARGIN_PX) / np.maximum(high - low, 1e-6))
     shapes = []
     for i, (path, is_seen) in enumerate(zip(places, observation.mask, strict=True)):
         own = path[is_seen]
         if not len(own):
             continue
         chosen = own[np.unique(np.linspace(0, len(own) - 1, MOST_POINTS).round().astype(int))]
-        x = width / 2 + scale * (chosen[:, 0] - centre[0])
-        y = height / 2 - scale * (chosen[:, 1] - centre[1])
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-        colour = f"var(--{object_colour(i)})"
+        drawn = size / 2 + scale * (chosen - (low + high) / 2) * (1, -1)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in drawn)
+        colour, (x, y) = f"var(--{object_colour(i)})", drawn[-1]
         shapes.append(
             f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
-            f'<circle cx="{x[-1]:.1f}" cy="{y[-1]:.1f}" r="3" fill="{colour}"/>'
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>'
         )
     label = escape(f"paths of the objects in {name}", quote=True)
-    return (
-        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{label}">'
-        f"{''.join(shapes)}</svg>"
-    )
+    view = f"0 0 {DRAWING_PX[0]} {DRAWING_PX[1]}"
+    return f'<svg viewBox="{view}" role="img" aria-label="{label}">{"".join(shapes)}</svg>'

@@ -2,24 +2,35 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from galileo_jax.report import html_page as html
 from galileo_jax.report.chart import Boxes, Chart, Panel
 from galileo_jax.report.class_chart import Agreement, class_section
-from galileo_jax.report.html_page import chart_section, document, header, legend, table
-from galileo_jax.report.provenance import versions
+from galileo_jax.report.provenance import versions_text
 from galileo_jax.report.sweep_clips import ClipRow, clips_section
-from galileo_jax.runtime.atomic_write import write_text
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
 BOXES_PX = 190
 MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
+EFFECT = (
+    "Error of each estimate, by the effect that was hidden in the clip. Where no truth is known: "
+    "the velocity error divided by the tracking noise; 1 is noise alone."
+)
+METHOD = "The same by method and by those of its options that differ between cells."
+NO_TRUTH = (
+    "The velocity error divided by the tracking noise, by method and by those of its options "
+    "that differ; 1 is noise alone."
+)
+CELLS = (
+    "The name of a cell is made from its options, the content of its clips and the version: the "
+    "same name means the same numbers."
+)
 
 
 def write_sweep_page(
@@ -38,40 +49,26 @@ def write_sweep_page(
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
     label = labels(done)
+    sections = [class_section(found), clips_section(clips)]
+    is_truth_known = any(row["hidden"] for row in done)
+    if is_truth_known:
+        sections.append(_errors("Error by effect", EFFECT, done, lambda row: row["hidden"], label))
+    if is_truth_known or len({label(row) for row in done}) > 1:
+        caption = METHOD if is_truth_known else NO_TRUTH
+        sections.append(_errors("Error by method", caption, done, label, label))
+        sections += [_confusion(done), _methods(done, label)]
+    else:
+        sections.append(_confusion(done))
+    cells = {"command": html.code(command), "versions": versions_text()}
+    sections += [
+        _failures(failed),
+        html.section("Provenance", html.prose(CELLS), html.listing(cells)),
+    ]
     lead = f"{len(done)} of {len(rows)} cells done"
     lead += f", {len(failed)} failed: see below." if failed else "."
     if apart := sum(bool(row.remark) for row in clips):
         lead += f" {apart} of {len(clips)} clips stand apart (◆)."
-    sections = [header("sweep", title, lead, is_good=not failed)]
-    if found:
-        sections.append(class_section(found))
-    if clips:
-        sections.append(clips_section(clips))
-    is_truth_known = any(row["hidden"] for row in done)
-    if is_truth_known:
-        sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
-    caption = _METHOD if is_truth_known else _NO_TRUTH
-    is_comparison = is_truth_known or len({label(row) for row in done}) > 1
-    if is_comparison:
-        sections += _errors("Error by method", caption, done, label, label)
-    sections += _confusion(done)
-    if is_comparison:
-        sections.append(_methods(done, label))
-    if failed:
-        sections.append(_failures(failed))
-    sections.append(_provenance(command))
-    write_text(path, document(f"{title}: sweep", sections))
-
-
-_EFFECT = (
-    "Error of each estimate, by the effect that was hidden in the clip. Where no truth is known: "
-    "the velocity error divided by the tracking noise; 1 is noise alone."
-)
-_METHOD = "The same by method and by those of its options that differ between cells."
-_NO_TRUTH = (
-    "The velocity error divided by the tracking noise, by method and by those of its options "
-    "that differ; 1 is noise alone."
-)
+    html.write_page(path, "sweep", title, lead, sections, is_good=not failed)
 
 
 def labels(rows: Iterable[Row]) -> Callable[[Row], str]:
@@ -103,25 +100,33 @@ def _errors(
     rows: Sequence[Row],
     category: Callable[[Row], str | None],
     label: Callable[[Row], str],
-) -> list[str]:
+) -> str:
     """Box plots of each quantity's errors; of chi2 per degree of freedom where none is known."""
-    charts = []
-    for name, symbol in QUANTITIES.items():
-        known = [row for row in rows if _has_error(row, name)]
-        if known:
-            values = [abs(row[f"{name}_error"]) for row in known]
-            title = f"error of {symbol}"
-            charts.append(_boxes(title, known, values, category, label))
-    if not charts:
-        known = [row for row in rows if row["chi2_per_dof"] is not None]
-        if not known:
-            return []
-        values = [row["chi2_per_dof"] for row in known]
-        charts.append(_boxes("chi2 per degree of freedom", known, values, category, label))
     names = sorted({label(row) for row in rows})
-    key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
+    colours = {name: COLOURS[i % len(COLOURS)] for i, name in enumerate(names)}
+
+    def boxes(title: str, known: Sequence[Row], value: Callable[[Row], float]) -> Chart:
+        is_beside = category is not label and len({label(row) for row in known}) > 1
+        marks = []
+        for name in sorted({label(row) for row in known}):
+            own = [row for row in known if label(row) == name]
+            places = [category(row) or "unknown" for row in own]
+            marks.append(Boxes(places, [*map(value, own)], colours[name], name, is_beside))
+        panel = Panel(title, tuple(marks), ylim=(0.0, 1.05 * max(map(value, known)) or 1.0))
+        return Chart(title, f"{title}, box plots", (panel,), panel_px=BOXES_PX)
+
+    charts = [
+        boxes(f"error of {symbol}", known, lambda row, name=name: abs(row[f"{name}_error"]))
+        for name, symbol in QUANTITIES.items()
+        if (known := [row for row in rows if _has_error(row, name)])
+    ]
+    if not charts and (known := [row for row in rows if row["chi2_per_dof"] is not None]):
+        charts = [boxes("chi2 per degree of freedom", known, lambda row: row["chi2_per_dof"])]
+    if not charts:
+        return ""
+    key = html.legend(("dot", colour, name) for name, colour in colours.items())
     # Plotly's charts are as wide as the screen: on paper they would be cut off.
-    return [f'<div class="screen">{chart_section(heading, caption, charts, legend=key)}</div>']
+    return f'<div class="screen">{html.chart_section(heading, caption, charts, key=key)}</div>'
 
 
 def _has_error(row: Row, quantity: str) -> bool:
@@ -129,47 +134,28 @@ def _has_error(row: Row, quantity: str) -> bool:
     return row[f"{quantity}_error"] is not None and row[f"{quantity}_identified"] is not False
 
 
-def _boxes(
-    title: str,
-    rows: Sequence[Row],
-    values: Sequence[float],
-    category: Callable[[Row], str | None],
-    label: Callable[[Row], str],
-) -> Chart:
-    names = sorted({label(row) for row in rows})
-    is_beside = category is not label and len(names) > 1
-    marks = []
-    for i, name in enumerate(names):
-        own = [j for j, row in enumerate(rows) if label(row) == name]
-        places = [category(rows[j]) or "unknown" for j in own]
-        colour = COLOURS[i % len(COLOURS)]
-        marks.append(Boxes(places, [values[j] for j in own], colour, name, is_beside))
-    panel = Panel(title, tuple(marks), ylim=(0.0, 1.05 * max(values) or 1.0))
-    return Chart(title, f"{title}, box plots", (panel,), panel_px=BOXES_PX)
-
-
-def _confusion(rows: Sequence[Row]) -> list[str]:
+def _confusion(rows: Sequence[Row]) -> str:
     """The hidden effect against the verdict."""
     known = [(row["hidden"], row["verdict"]) for row in rows if row["verdict"] and row["hidden"]]
     if not known:
-        return []
+        return ""
     hidden = sorted({h for h, _ in known})
     verdicts = sorted({v for _, v in known}, key=lambda v: (v not in hidden, v))
     count = Counter(known)
     most = max(count.values())
-    lines = [[escape(h), *(_shaded(count[h, v], most) for v in verdicts)] for h in hidden]
-    right = sum(n for (h, v), n in count.items() if h == v)
-    return [
-        f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the "
-        f"verdict of the diagnosis. {right} of {len(known)} are correct; none means that no "
-        f"effect is missing.</p>\n{table(['', *verdicts], lines)}"
-    ]
+    lines = [[h, *(_shaded(count[h, v], most) for v in verdicts)] for h in hidden]
+    note = (
+        "Rows: the effect hidden in the clip. Columns: the verdict of the diagnosis. "
+        f"{sum(h == v for h, v in known)} of {len(known)} are correct; none means that no effect "
+        "is missing."
+    )
+    return html.section("Hidden and named", html.prose(note), html.table(["", *verdicts], lines))
 
 
-def _shaded(number: int, most: int) -> str:
+def _shaded(number: int, most: int) -> html.Html:
     """The number on a ground that is the darker the larger it is; nothing for 0."""
-    share = round(80 * number / most)
-    return f'<span class="share" style="--share:{share}%">{number}</span>' if number else ""
+    look = f'class="share" style="--share:{round(80 * number / most)}%"'
+    return html.Html(f"<span {look}>{number}</span>" if number else "")
 
 
 def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:
@@ -180,13 +166,13 @@ def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:
     lines = []
     for name in sorted({label(row) for row in rows}):
         own = [row for row in rows if label(row) == name]
-        line = [escape(name), str(len(own)), _share(row["converged"] for row in own)]
+        line = [name, str(len(own)), _share(row["converged"] for row in own)]
         for quantity in QUANTITIES:
             errors = [abs(row[f"{quantity}_error"]) for row in own if _has_error(row, quantity)]
             line.append(f"{np.median(errors):.3g}" if errors else "")
             line.append(_share(row[f"{quantity}_covered"] for row in own))
         lines.append(line)
-    return "<h2>Methods</h2>\n" + table(head, lines)
+    return html.section("Methods", html.table(head, lines))
 
 
 def _share(values: Iterable[bool | None]) -> str:
@@ -196,17 +182,9 @@ def _share(values: Iterable[bool | None]) -> str:
 
 
 def _failures(rows: Sequence[Row]) -> str:
-    lines = [[f"<code>{escape(row['cell'])}</code>", escape(row["failure"])] for row in rows]
+    if not rows:
+        return ""
+    lines = [[html.code(row["cell"]), row["failure"]] for row in rows]
     more = len(lines) - MAX_FAILURES
-    note = f"<p>{more} more are in summary.csv.</p>" if more > 0 else ""
-    return "<h2>Failed</h2>\n" + table(["cell", "why"], lines[:MAX_FAILURES]) + note
-
-
-def _provenance(command: str) -> str:
-    listed = ", ".join(f"{name} {found}" for name, found in versions().items())
-    return (
-        "<h2>Provenance</h2>\n<p>The name of a cell is made from its options, the content of its "
-        "clips and the version: the same name means the same numbers.</p>\n"
-        f"<dl><dt>command</dt><dd><code>{escape(command)}</code></dd>"
-        f"<dt>versions</dt><dd>{escape(listed)}</dd></dl>"
-    )
+    note = html.prose(f"{more} more are in summary.csv.") if more > 0 else ""
+    return html.section("Failed", html.table(["cell", "why"], lines[:MAX_FAILURES]), note)

@@ -3,6 +3,7 @@
 import base64
 from collections import deque
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -34,26 +35,23 @@ def sample_frames(video: Path, num_frames: int) -> VideoFrames:
     The first picture decides how much the JPEGs are compressed, so that one frame is in memory
     at a time.
     """
-    stride = -(-num_frames // MOST_PICTURES)
-    wanted = range(0, num_frames, stride)
     from galileo_jax.video import decode
 
+    wanted = range(0, num_frames, -(-num_frames // MOST_PICTURES))
     share = BUDGET_BYTES / len(wanted)
-    frames, pictures, quality, size = [], [], 0, (0, 0)
-    for index, frame in enumerate(decode.frames(video)):
-        if index >= num_frames:
-            break
-        if index % stride:
-            continue
-        if not size[0]:
+    pictures, quality, size = [], 0, (0, 0)
+    for frame in islice(decode.frames(video), 0, num_frames, wanted.step):
+        if not pictures:
             size = smaller_size(frame, LARGEST_PX)
-            quality = next(
-                (q for q in QUALITIES if len(jpeg(frame, LARGEST_PX, q)) <= share), QUALITIES[-1]
-            )
-        frames.append(index)
-        encoded = base64.b64encode(jpeg(frame, LARGEST_PX, quality)).decode("ascii")
-        pictures.append(f"data:image/jpeg;base64,{encoded}")
-    return VideoFrames(tuple(frames), tuple(pictures), size)
+            fitting = (q for q in QUALITIES if len(jpeg(frame, LARGEST_PX, q)) <= share)
+            quality = next(fitting, QUALITIES[-1])
+        pictures.append(data_uri("jpeg", jpeg(frame, LARGEST_PX, quality)))
+    return VideoFrames(tuple(wanted[: len(pictures)]), tuple(pictures), size)
+
+
+def data_uri(kind: str, picture: bytes) -> str:
+    """A picture as a page carries it; `kind`: "jpeg", "png"."""
+    return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
 
 
 def first_and_last_frame(video: Path) -> list[np.ndarray]:

@@ -1,22 +1,24 @@
 """`Check`: what is still missing in a clip's marks, or odd, in words."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
-from galileo_jax.studio.marks import Marks
+from galileo_jax.studio.marks import Corners, Marks
 
 ODD_ANGLE_SD_DEG = 0.3  # worse, and the ramp's line decides how well k1 is known
 USUAL_RATES = (24.0, 25.0, 29.97, 30.0)  # what containers of slow-motion clips say, too
 SAME_RATE = 0.01
+Kind = Literal["missing", "odd"]
 
 
 @dataclass(frozen=True)
 class Remark:
     """One thing to know: `missing` holds tracking up, `odd` does not."""
 
-    kind: Literal["missing", "odd"]
+    kind: Kind
     sentence: str
 
 
@@ -25,61 +27,53 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
 
     `problem`: why the yaml could not be written, if it could not.
     """
-    found = []
+    return tuple(Remark(kind, text) for kind, text in _said(marks, container_fps, problem))
+
+
+def _said(marks: Marks, container_fps: float, problem: str | None) -> Iterator[tuple[Kind, str]]:
     if not marks.objects:
-        found.append(Remark("missing", "No object is marked. Add one and drag it to its centre."))
+        yield "missing", "No object is marked. Add one and drag it to its centre."
     if marks.has_ramp and not (marks.upper and marks.foot):
-        found.append(Remark("missing", "The ramp is not marked. Draw its line."))
+        yield "missing", "The ramp is not marked. Draw its line."
     if marks.rectangle is not None:
-        found.extend(_of_rectangle(marks))
-    elif marks.has_table and marks.stick_m is None:
-        found.append(
-            Remark(
+        if not marks.has_scale:
+            yield "missing", "Type the rectangle's width and height, or switch back to the ruler."
+        if _is_crossed(marks.rectangle):
+            yield (
                 "missing",
-                "The scale is unknown. Drag the ruler onto a known length and type the length.",
+                "The rectangle's corners are crossed: 1 is its bottom left, 2 its bottom right.",
             )
+    elif marks.has_table and marks.stick_m is None:
+        yield (
+            "missing",
+            "The scale is unknown. Drag the ruler onto a known length and type the length.",
         )
     if problem:
-        found.append(Remark("missing", problem))
+        yield "missing", problem
     if not marks.has_table and marks.rectangle is None and marks.stick_m is None:
-        found.append(
-            Remark("odd", "The scale is unknown: friction and scale show only in combination.")
-        )
+        yield "odd", "The scale is unknown: friction and scale show only in combination."
     is_from_file = abs(marks.fps - container_fps) < SAME_RATE
     if is_from_file and any(abs(marks.fps - rate) < SAME_RATE for rate in USUAL_RATES):
-        found.append(
-            Remark(
-                "odd",
-                f"{marks.fps:.4g} frames per second is the rate in the file; slow-motion files "
-                "often state a wrong one.",
-            )
+        yield (
+            "odd",
+            f"{marks.fps:.4g} frames per second is the rate in the file; slow-motion files "
+            "often state a wrong one.",
         )
     if marks.has_ramp and marks.upper and marks.foot:
         length = math.dist(marks.upper, marks.foot)
         sd = math.degrees(math.sqrt(2) * CLICK_SD_PX / max(length, 1e-6))
         if sd > ODD_ANGLE_SD_DEG:
-            found.append(
-                Remark(
-                    "odd",
-                    f"The ramp's line is {length:.0f} px long: its angle is known to {sd:.1f} "
-                    "degrees. Draw a longer line.",
-                )
+            yield (
+                "odd",
+                f"The ramp's line is {length:.0f} px long: its angle is known to {sd:.1f} "
+                "degrees. Draw a longer line.",
             )
-    return tuple(found)
 
 
-def _of_rectangle(marks: Marks) -> list[Remark]:
-    """Its sides, and whether its corners are in their order."""
-    assert marks.rectangle is not None
-    found = []
-    if not marks.has_scale:
-        text = "Type the rectangle's width and height, or switch back to the ruler."
-        found.append(Remark("missing", text))
+def _is_crossed(corners: Corners) -> bool:
+    """Whether they do not go round counter-clockwise as seen, y down."""
     turns = []
     for i in range(4):
-        (x1, y1), (x2, y2), (x3, y3) = (marks.rectangle[(i + k) % 4] for k in range(3))
+        (x1, y1), (x2, y2), (x3, y3) = (corners[(i + k) % 4] for k in range(3))
         turns.append((x2 - x1) * (y3 - y2) - (y2 - y1) * (x3 - x2))
-    if max(turns) >= 0:  # counter-clockwise as seen, y down
-        text = "The rectangle's corners are crossed: 1 is its bottom left, 2 its bottom right."
-        found.append(Remark("missing", text))
-    return found
+    return max(turns) >= 0

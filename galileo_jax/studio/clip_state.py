@@ -1,5 +1,6 @@
 """One clip being marked: its marks, undo and redo, each step on disk before it is shown."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,16 @@ class Step:
     problem: str | None = None
 
 
-STORED = TypeAdapter(Step)
+@dataclass(frozen=True)
+class History:
+    """The marks now, and what undo and redo lead to, the nearest last."""
+
+    present: Step
+    past: tuple[Step, ...] = ()
+    future: tuple[Step, ...] = ()
+
+
+STORED = TypeAdapter(History)
 
 
 @dataclass(frozen=True)
@@ -78,28 +88,25 @@ class Sheet(Opened):
 
     Attributes:
       info: of the film.
-      present: the marks now.
-      past, future: what undo and redo lead to, the nearest last.
+      history: of the marks.
       is_drawn: whether a person or a proposal has drawn anything yet.
     """
 
     info: VideoInfo
-    present: Step
-    past: tuple[Step, ...] = ()
-    future: tuple[Step, ...] = ()
+    history: History
     is_drawn: bool = True
 
     @property
     def marks(self) -> Marks:
         """As drawn now."""
-        return self.present.marks
+        return self.history.present.marks
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is missing or odd."""
         if not self.is_drawn:
             return (Remark("missing", "Nothing is marked yet."),)
-        return remarks_on(self.marks, self.info.container_fps, self.present.problem)
+        return remarks_on(self.marks, self.info.container_fps, self.history.present.problem)
 
     @property
     def is_complete(self) -> bool:
@@ -118,20 +125,21 @@ def opened(root: Path, video: Path, store: Store) -> Sheet:
     text = _read(path)
     content = yaml_content(path)
     check_declared(root, video.parent, content)
-    entry = store.get("clips", video.stem)
-    present = _step(entry.get("present"))
-    past, future = _steps(entry.get("past")), _steps(entry.get("future"))
-    if present is not None and present.yaml == text:
-        return Sheet(root, video, info, present, past, future)
-    found = _of_yaml(content, info)
-    if text is not None and found is not None:  # somebody else has written it meanwhile
-        before = () if present is None else (*past, present)
-        return Sheet(root, video, info, Step(found, text), before)
+    kept = stored(store.get("clips", video.stem))
+    if kept is not None and kept.present.yaml == text:
+        return Sheet(root, video, info, kept)
+    fps = info.container_fps or 30.0
     problem = None
     if text is not None:
-        problem = _problem_of(path)
-    empty = blank(info.container_fps or 30.0, info.size_px)
-    return Sheet(root, video, info, Step(empty, text, problem), is_drawn=text is not None)
+        try:
+            found = Step(declared(content, info.size_px, fps), text)
+            # Somebody else has written it meanwhile.
+            before = () if kept is None else (*kept.past, kept.present)
+            return Sheet(root, video, info, History(found, before))
+        except (KeyError, TypeError, ValueError, IndexError):
+            problem = _problem_of(path)
+    empty = Step(blank(fps, info.size_px), text, problem)
+    return Sheet(root, video, info, History(empty), is_drawn=text is not None)
 
 
 def opened_table(root: Path, source: Path) -> Table:
@@ -148,36 +156,36 @@ def changed(sheet: Sheet, marks: Marks, store: Store) -> Sheet:
     """The sheet with other marks, written to the yaml where they are valid."""
     if marks == sheet.marks and sheet.is_drawn:
         return sheet
-    problem = _write(sheet, marks)
+    problem, history = _write(sheet, marks), sheet.history
     step = Step(marks, _read(sheet.yaml), problem)
-    past = (*sheet.past, sheet.present)[-MOST_STEPS:] if sheet.is_drawn else sheet.past
-    return _stored(replace(sheet, present=step, past=past, future=(), is_drawn=True), store)
+    past = (*history.past, history.present)[-MOST_STEPS:] if sheet.is_drawn else history.past
+    return _kept(replace(sheet, history=History(step, past), is_drawn=True), store)
 
 
 def undone(sheet: Sheet, store: Store) -> Sheet:
     """One step back; the yaml is what it was then, comments included."""
-    if not sheet.past:
+    now = sheet.history
+    if not now.past:
         return sheet
-    *past, step = sheet.past
-    future = (*sheet.future, sheet.present)
-    return _restored(replace(sheet, present=step, past=tuple(past), future=future), store)
+    *past, step = now.past
+    return _restored(sheet, History(step, tuple(past), (*now.future, now.present)), store)
 
 
 def redone(sheet: Sheet, store: Store) -> Sheet:
     """One step forth again."""
-    if not sheet.future:
+    now = sheet.history
+    if not now.future:
         return sheet
-    *future, step = sheet.future
-    past = (*sheet.past, sheet.present)
-    return _restored(replace(sheet, present=step, past=past, future=tuple(future)), store)
+    *future, step = now.future
+    return _restored(sheet, History(step, (*now.past, now.present), tuple(future)), store)
 
 
-def _restored(sheet: Sheet, store: Store) -> Sheet:
-    if sheet.present.yaml is None:
+def _restored(sheet: Sheet, history: History, store: Store) -> Sheet:
+    if history.present.yaml is None:
         sheet.yaml.unlink(missing_ok=True)
     else:
-        write_text(sheet.yaml, sheet.present.yaml)
-    return _stored(sheet, store)
+        write_text(sheet.yaml, history.present.yaml)
+    return _kept(replace(sheet, history=history), store)
 
 
 def _write(sheet: Sheet, marks: Marks) -> str | None:
@@ -185,7 +193,7 @@ def _write(sheet: Sheet, marks: Marks) -> str | None:
     before = None
     text = _read(sheet.yaml)
     if text is not None:  # relative to what the yaml says, not to what it refused
-        steps = (sheet.present, *reversed(sheet.past))
+        steps = (sheet.history.present, *reversed(sheet.history.past))
         before = next((s.marks for s in steps if s.yaml == text and s.problem is None), None)
     try:
         if before is not None:
@@ -215,33 +223,16 @@ def said(error: Exception, sheet: Sheet) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _stored(sheet: Sheet, store: Store) -> Sheet:
-    entry = {
-        "present": asdict(sheet.present),
-        "past": [asdict(step) for step in sheet.past],
-        "future": [asdict(step) for step in sheet.future],
-    }
-    store.put("clips", sheet.name, store.get("clips", sheet.name) | entry)
+def _kept(sheet: Sheet, store: Store) -> Sheet:
+    store.put("clips", sheet.name, store.get("clips", sheet.name) | asdict(sheet.history))
     return sheet
 
 
-def _step(entry: Any) -> Step | None:
-    """A step as it was stored; None where it is no such thing."""
+def stored(entry: Mapping[str, Any]) -> History | None:
+    """A history as it was stored; None where it is no such thing."""
     try:
         return STORED.validate_python(entry)
     except ValidationError:
-        return None
-
-
-def _steps(entries: Any) -> tuple[Step, ...]:
-    found = [_step(one) for one in entries] if isinstance(entries, list) else []
-    return tuple(step for step in found if step is not None)
-
-
-def _of_yaml(content: dict[str, Any], info: VideoInfo) -> Marks | None:
-    try:
-        return declared(content, info.size_px, info.container_fps or 30.0)
-    except (KeyError, TypeError, ValueError, IndexError):
         return None
 
 

@@ -9,6 +9,7 @@ from galileo_jax.video import decode
 
 LARGEST_PX = 1280
 QUALITY = 85
+PATIENCE_S = 10.0  # for a frame to be decoded
 
 
 class Frames:
@@ -22,10 +23,10 @@ class Frames:
         self._changed = threading.Condition()
         threading.Thread(target=self._decode, daemon=True).start()
 
-    def picture(self, index: int, patience_s: float = 10.0) -> bytes | None:
+    def picture(self, index: int) -> bytes | None:
         """The JPEG of a frame; None beyond the end, or where it cannot be decoded in time."""
         with self._changed:
-            self._changed.wait_for(lambda: self._ready > index or self._is_over, patience_s)
+            self._changed.wait_for(lambda: self._ready > index or self._is_over, PATIENCE_S)
             if not 0 <= index < self._ready:
                 return None
         return self._path(index).read_bytes()

@@ -15,6 +15,8 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
 
+from galileo_jax.studio.upload import LARGEST_BYTES, UPLOAD
+
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
@@ -39,18 +41,12 @@ class _TooLarge(Exception):  # noqa: N818 - an answer, raised through the app th
 
 
 class Guard:
-    """Wraps an ASGI application.
+    """Wraps an ASGI application."""
 
-    Larger bodies are let through, up to `largest_upload` bytes, at `upload_path`.
-    """
-
-    def __init__(
-        self, app: App, *, port: int, token: str, upload_path: str, largest_upload: int
-    ) -> None:
+    def __init__(self, app: App, *, port: int, token: str) -> None:
         self._app, self._token = app, token
         self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
         self._cookie = f"galileo_studio_{port}"
-        self._upload_path, self._largest_upload = upload_path, largest_upload
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Lets a request through, or answers it."""
@@ -78,9 +74,7 @@ class Guard:
             return "no origin"
         if origin is not None and origin not in {f"http://{host}" for host in self._hosts}:
             return "another origin"
-        if self._has_cookie(headers.get("cookie", "")):
-            return ""
-        if self._is_entrance(scope):
+        if self._has_cookie(headers.get("cookie", "")) or self._is_entrance(scope):
             return ""
         return "no token: open the address that galileo studio printed"
 
@@ -110,14 +104,13 @@ class Guard:
     async def _http(
         self, scope: Scope, headers: MutableMapping[str, str], receive: Receive, send: Send
     ) -> None:
-        is_upload = scope["path"].startswith(self._upload_path)
-        limit = self._largest_upload if is_upload else LARGEST_BODY
+        limit = LARGEST_BYTES if scope["path"].startswith(UPLOAD) else LARGEST_BODY
+        too_large = f"larger than {limit // 1_000_000} MB"
         length = headers.get("content-length", "0")
         if not length.isdecimal() or int(length) > limit:
-            await _refuse(scope, receive, send, 413, f"larger than {limit // 1_000_000} MB")
+            await _refuse(scope, receive, send, 413, too_large)
             return
-        read = 0
-        has_begun = False
+        read, has_begun = 0, False
 
         async def counted() -> MutableMapping[str, Any]:
             nonlocal read
@@ -138,8 +131,7 @@ class Guard:
             await self._app(scope, counted, sending)
         except _TooLarge:
             if not has_begun:
-                text = f"larger than {limit // 1_000_000} MB"
-                await _refuse(scope, receive, send, 413, text)
+                await _refuse(scope, receive, send, 413, too_large)
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: str) -> None:

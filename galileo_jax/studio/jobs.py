@@ -6,12 +6,14 @@ ends with the server, however that ends: it waits for its parent beside the work
 
 import contextlib
 import itertools
+import math
 import multiprocessing
 import os
 import queue
 import threading
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any, Literal
 
@@ -19,6 +21,8 @@ from galileo_jax.runtime.child_process import end_with_parent
 
 NICENESS = 5
 PATIENCE_S = 20.0  # for work that was cancelled to stop by itself, before its process is ended
+
+LEAST_SPENT_S, LEAST_SHARE = 3.0, 0.05  # before it is said how long a job will take
 
 Kind = Literal["progress", "partial", "done", "error", "cancelled"]
 
@@ -41,7 +45,23 @@ class Message:
     content: Any = None
 
 
-OnMessage = Callable[[Message], None]
+@dataclass(frozen=True)
+class Job:
+    """The job that runs, as the page shows it."""
+
+    task: str
+    stage: str = "starting"
+    share: float = 0.0
+    is_cancelled: bool = False
+    begun: float = field(default_factory=time.monotonic)
+
+    def time_left(self, now: float) -> str:
+        """How long it will still take if it goes on as until now; "" while that is unknown."""
+        spent = now - self.begun
+        if self.is_cancelled or spent < LEAST_SPENT_S or not LEAST_SHARE < self.share < 1:
+            return ""
+        seconds = spent * (1 - self.share) / self.share
+        return f"about {10 * math.ceil(seconds / 10)} s left"
 
 
 class Worker:
@@ -50,9 +70,8 @@ class Worker:
     `on_message` is called in a thread of this process.
     """
 
-    def __init__(self, folder: str, on_message: OnMessage):
+    def __init__(self, folder: str, on_message: Callable[[Message], None]):
         self._folder, self._on_message = folder, on_message
-        self._context = multiprocessing.get_context("spawn")
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._process: Any = None
@@ -74,19 +93,14 @@ class Worker:
         with self._lock:
             if self._current is not None:
                 raise RuntimeError(f"{self._current.task} is running")
-            number = next(self._numbers)
-            pipe = self._started()
-            self._is_cancelled = False
+            number, self._is_cancelled = self._send("job", task, given), False
             self._current = Message(number, task, "progress")
-            pipe.send(("job", number, task, given))
             return number
 
     def ask(self, task: str, **given: Any) -> int:
         """Sends a quick question, answered beside the job."""
         with self._lock:
-            number = next(self._numbers)
-            self._started().send(("ask", number, task, given))
-            return number
+            return self._send("ask", task, given)
 
     def cancel(self) -> None:
         """Asks the job to stop; its process is ended if it does not."""
@@ -96,7 +110,7 @@ class Worker:
             self._is_cancelled = True
             if self._pipe is not None:
                 with contextlib.suppress(OSError):
-                    self._pipe.send(("cancel", self._current.job))
+                    self._pipe.send(("cancel",))
             timer = threading.Timer(PATIENCE_S, self._end_if_busy, [self._current.job])
         timer.daemon = True
         timer.start()
@@ -109,41 +123,36 @@ class Worker:
             process.kill()
             process.join(5)
 
-    def _started(self) -> Connection:
-        if self._process is not None and self._process.is_alive() and self._pipe is not None:
-            return self._pipe
-        ours, theirs = self._context.Pipe()
-        self._process = self._context.Process(
-            target=serve, args=(theirs, self._folder), daemon=True
-        )
-        self._process.start()
-        theirs.close()
-        self._pipe = ours
-        threading.Thread(target=self._listen, args=(ours,), daemon=True).start()
-        return ours
+    def _send(self, kind: str, task: str, given: Mapping[str, Any]) -> int:
+        if self._pipe is None or self._process is None or not self._process.is_alive():
+            context = multiprocessing.get_context("spawn")
+            self._pipe, theirs = context.Pipe()
+            self._process = context.Process(target=serve, args=(theirs, self._folder), daemon=True)
+            self._process.start()
+            theirs.close()
+            threading.Thread(target=self._listen, args=(self._pipe,), daemon=True).start()
+        number = next(self._numbers)
+        self._pipe.send((kind, number, task, given))
+        return number
 
     def _listen(self, pipe: Connection) -> None:
-        while True:
-            try:
-                message = pipe.recv()
-            except (EOFError, OSError):
-                break
-            self._hand_on(message)
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                self._hand_on(pipe.recv())
         with self._lock:
-            lost = self._current if pipe is self._pipe else None
-            if pipe is self._pipe:
-                self._pipe = None
-            is_cancelled = self._is_cancelled
+            if pipe is not self._pipe:
+                return
+            lost, self._pipe, is_cancelled = self._current, None, self._is_cancelled
         if lost is not None:
             kind: Kind = "cancelled" if is_cancelled else "error"
             text = "the process that computed it has ended; try again"
             self._hand_on(Message(lost.job, lost.task, kind, text))
 
     def _hand_on(self, message: Message) -> None:
-        if message.kind not in ("progress", "partial"):
-            with self._lock:
-                if self._current is not None and self._current.job == message.job:
-                    self._current = None
+        with self._lock:
+            is_over = message.kind not in ("progress", "partial")
+            if is_over and self._current is not None and self._current.job == message.job:
+                self._current = None
         self._on_message(message)
 
     def _end_if_busy(self, job: int) -> None:
@@ -154,17 +163,6 @@ class Worker:
             process.kill()
 
 
-class _Cancel:
-    """The flag of the job that runs; asked for in the thread that listens."""
-
-    def __init__(self) -> None:
-        self.wanted: set[int] = set()
-        self.job = 0
-
-    def is_set(self) -> bool:
-        return self.job in self.wanted
-
-
 def serve(pipe: Connection, folder: str) -> None:
     """What the process does: jobs in its main thread, questions in another."""
     end_with_parent()
@@ -172,9 +170,10 @@ def serve(pipe: Connection, folder: str) -> None:
         os.nice(NICENESS)
     os.chdir(folder)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    jobs: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    lock, cancel = threading.Lock(), _Cancel()
+    lines: dict[str, queue.SimpleQueue[Any]] = {
+        kind: queue.SimpleQueue() for kind in ("job", "ask")
+    }
+    lock, cancel = threading.Lock(), threading.Event()
 
     def send(message: Message) -> None:
         with lock, contextlib.suppress(OSError):
@@ -187,20 +186,20 @@ def serve(pipe: Connection, folder: str) -> None:
             except (EOFError, OSError):
                 os._exit(0)
             if kind == "cancel":
-                cancel.wanted.add(rest[0])
-            else:
-                (jobs if kind == "job" else questions).put(rest)
+                cancel.set()
+                continue
+            if kind == "job":
+                cancel.clear()  # the one before it is over
+            lines[kind].put(rest)
 
-    def answer(line: queue.SimpleQueue[Any], flag: _Cancel | None) -> None:
+    def answer(kind: str) -> None:
         while True:
-            number, task, given = line.get()
-            if flag is not None:
-                flag.job = number
-            _run(number, task, given, send, flag)
+            number, task, given = lines[kind].get()
+            _run(number, task, given, send, cancel if kind == "job" else None)
 
     threading.Thread(target=receive, daemon=True).start()
-    threading.Thread(target=answer, args=(questions, None), daemon=True).start()
-    answer(jobs, cancel)
+    threading.Thread(target=answer, args=("ask",), daemon=True).start()
+    answer("job")
 
 
 def _run(
@@ -219,14 +218,11 @@ def _run(
         if isinstance(partial, dict | gx.Explanation):
             send(Message(number, task, "partial", work.shown(partial)))
 
-    def partial(content: Mapping[str, Any]) -> None:
-        send(Message(number, task, "partial", content))
-
     try:
         from galileo_jax.studio import work
 
         with scope(on_progress, cancel):
-            content = work.TASKS[task](partial=partial, **given)
+            content = work.TASKS[task](**given)
         send(Message(number, task, "done", content))
     except Cancelled:
         send(Message(number, task, "cancelled"))

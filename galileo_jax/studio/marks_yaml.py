@@ -82,12 +82,11 @@ def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
     """
     old = before or Marks(scenario="", fps=math.nan)
     found: dict[str, Any] = {}
-    if after.scenario != old.scenario:
-        found["scenario"] = after.scenario
-    if after.fps != old.fps:
-        found["fps"] = after.fps
+    for key in ("scenario", "fps"):
+        if (value := getattr(after, key)) != getattr(old, key):
+            found[key] = value
     if after.has_ramp and after.upper and after.foot:
-        if before is None or _line(before) != _line(after) or after.scenario != old.scenario:
+        if before is None or _line(before) != _line(after) or "scenario" in found:
             found["ramp"] = (*after.upper, *after.foot)
         if after.has_table and (before is None or before.foot != after.foot):
             found["origin"] = after.foot
@@ -100,20 +99,21 @@ def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
     known = {one.name: one for one in old.objects}
     for one in after.objects:
         was = known.get(one.name, ObjectMark(one.name, shape=""))
-        if one.point != was.point and one.point is not None:
-            found.setdefault("point", {})[one.name] = one.point
-        if one.shape != was.shape:
-            found.setdefault("shape", {})[one.name] = one.shape
-        if one.size_m != was.size_m and one.size_m is not None:
-            found.setdefault("size", {})[one.name] = one.size_m
-        if after.first_frame != old.first_frame:
-            found.setdefault("first_frame", {})[one.name] = after.first_frame
-        if after.last_frame != old.last_frame:
-            found.setdefault("last_frame", {})[one.name] = after.last_frame
+        own = {
+            "point": one.point if one.point != was.point else None,
+            "shape": one.shape if one.shape != was.shape else None,
+            "size": one.size_m if one.size_m != was.size_m else None,
+        }
+        own = {key: value for key, value in own.items() if value is not None}
+        for key in ("first_frame", "last_frame"):
+            if getattr(after, key) != getattr(old, key):
+                own[key] = getattr(after, key)
         new = [c for c in one.corrections if c not in was.corrections]
         gone = {c[0] for c in was.corrections} - {c[0] for c in one.corrections}
         if new or gone:
-            found.setdefault("correct", {})[one.name] = [*new, *((f,) for f in sorted(gone))]
+            own["correct"] = [*new, *((frame,) for frame in sorted(gone))]
+        for key, value in own.items():
+            found.setdefault(key, {})[one.name] = value
     return found
 
 

@@ -2,8 +2,6 @@
 
 import asyncio
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,10 +9,12 @@ from typing import Any
 from nicegui import ui
 
 from galileo_jax.studio import charts
-from galileo_jax.studio.marks import Marks, corrected, moved, with_object
+from galileo_jax.studio.marks import corrected, moved, with_object
 from galileo_jax.studio.panels import compare, diagnose, explain, fit, marks, predict, track, video
+from galileo_jax.studio.panels.parts import icon_button, row
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.stages import STAGES
+from galileo_jax.studio.tab import Tab
 from galileo_jax.studio.viewer import Viewer
 
 HERE = Path(__file__).parent
@@ -36,69 +36,13 @@ PARTS = {
     "explain": {"clips", "results"},
 }  # that their panels show
 RUNNING = {"propose": "marks", "open_run": "fit", "export": "predict"}  # else its own stage
-
-
-@dataclass
-class Tab:
-    """What one tab shows; the session is the same for all.
-
-    Attributes:
-      session: the clips and results.
-      stage: the panel.
-      candidate: whose curve is looked at.
-      placing: what a click into the video places: a new object, or one that is put right; "":
-        nothing.
-      frame: that is shown.
-      is_writing, draft: whether an effect is being written, and its text; None: as saved.
-      dark: the colours.
-      said: the job, the error and the note that are shown.
-      drawn, lamps: what the panel and the row of stages were built of.
-      refresh: does that.
-      redraw: shows everything anew.
-      redraw_curves: only the video and what is below it.
-    """
-
-    session: Session
-    stage: str = "explain"
-    candidate: str = ""
-    placing: str = ""
-    frame: int = 0
-    is_writing: bool = False
-    draft: str | None = None
-    dark: bool = False
-    said: tuple[str, str, str] = ("", "", "")
-    drawn: Any = None
-    lamps: Any = None
-    refresh: Callable[[], None] = lambda: None
-    redraw: Callable[[], None] = lambda: None
-    redraw_curves: Callable[[], None] = lambda: None
-
-    def go(self, stage: str) -> None:
-        """Turns to a stage."""
-        if self.stage == "fit" != stage and self.session.results.live is not None:
-            self.session.put_back()
-        self.stage, self.candidate, self.placing = stage, "", ""
-        if stage in ("fit", "compare", "diagnose", "predict"):
-            self.session.open_run()
-        if stage == "marks":
-            self.session.propose_once()
-        self.redraw()
-
-    def mark(self, marks: Marks) -> None:
-        """Draws, and shows it in this tab at once: what is typed next must not be swept away."""
-        self.session.mark(marks)
-        self.redraw()
-
-    def change(self, **given: Any) -> None:
-        """Draws the active clip's marks with other values."""
-        if self.session.sheet is not None:
-            self.mark(replace(self.session.sheet.marks, **given))
-
-    def preview(self, candidate: str) -> None:
-        """Looks at a candidate's curve."""
-        if candidate != self.candidate:
-            self.candidate = candidate
-            self.redraw_curves()  # and not the panel: a click that follows must find its button
+WORDS = {
+    "locked": "waiting for the step before it",
+    "open": "to do",
+    "done": "done",
+    "stale": "made with earlier marks",
+    "running": "running",
+}
 
 
 def build_page(session: Session) -> None:
@@ -122,14 +66,14 @@ class _Page:
         self._tab, self._session = tab, tab.session
         self._seen = dict(tab.session.versions)
         self._figure: Any = None
-        dark = ui.dark_mode(None)
+        self._dark = ui.dark_mode(None)
         with ui.element("header").classes("bar"):
             ui.label("galileo studio").classes("brand")
             self._stages = ui.element("nav").classes("stages").props('aria-label="stages"')
             with ui.element("div").classes("end"):
-                _icon("undo", "Undo", self._session.undo)
-                _icon("redo", "Redo", self._session.redo)
-                _icon("contrast", "Light or dark", lambda: _turn(tab, dark, self.show))
+                icon_button("undo", "Undo", self._session.undo)
+                icon_button("redo", "Redo", self._session.redo)
+                icon_button("contrast", "Light or dark", self._turn)
         with ui.element("main").classes("work"):
             with ui.element("section").classes("left"):
                 self._viewer = Viewer()
@@ -140,7 +84,11 @@ class _Page:
         self._job = ui.element("div")
         self._viewer.on("moved", self._on_moved)
         self._viewer.on("place", self._on_place)
-        self._viewer.on("frame", self._on_frame)
+        self._viewer.on("frame", lambda event: setattr(tab, "frame", int(event.args)))
+
+    def _turn(self) -> None:
+        self._dark.value = self._tab.dark = not self._tab.dark
+        self.show()
 
     def _on_moved(self, event: Any) -> None:
         sheet, given = self._session.sheet, event.args
@@ -160,9 +108,6 @@ class _Page:
         else:
             tab.mark(corrected(sheet.marks, name, int(frame), (x, y)))
             self._session.track()
-
-    def _on_frame(self, event: Any) -> None:
-        self._tab.frame = int(event.args)
 
     def show(self) -> None:
         """Shows everything anew."""
@@ -184,14 +129,25 @@ class _Page:
         asyncio.get_running_loop().call_later(CURVES_AFTER_S, self.curves)
 
     def _lamps(self) -> None:
-        tab, job = self._tab, self._session.job
-        now = (tab.stage, job.task if job else "", *self._session.states.values())
+        tab, job, states = self._tab, self._session.job, self._session.states
+        task = job.task if job else ""
+        now = (tab.stage, task, *states.values())
         if now == tab.lamps:
             return
         tab.lamps = now
         self._stages.clear()
-        with self._stages:
-            _stage_buttons(tab)
+        for stage, title in STAGES.items():
+            state = "running" if stage == RUNNING.get(task, task) else states[stage]
+            with self._stages, ui.element("button").classes("stagebutton") as button:
+                ui.element("span").classes(f"lamp {state}")
+                ui.label(title)
+            button.props(f"type=button data-stage={stage} data-state={state}")
+            button.props(f'title="{title}: {WORDS[state]}"')
+            if stage == tab.stage:
+                button.props('aria-current="step"')
+            if states[stage] == "locked":
+                button.props("disabled")
+            button.on("click", partial(tab.go, stage))
 
     def curves(self) -> None:
         """Shows the video and what is below it anew."""
@@ -203,10 +159,19 @@ class _Page:
             self._figure = figure
 
     def _bar(self) -> None:
+        """What is computed, how far it is, and how to stop it."""
         self._job.clear()
-        if self._session.job is not None:
-            with self._job:
-                _job_bar(self._session)
+        if (job := self._session.job) is None:
+            return
+        with self._job, ui.element("div").classes("job").props('role="status"'):
+            text = "stopping" if job.is_cancelled else job.stage
+            said = ", ".join(filter(None, (text, job.time_left(time.monotonic()))))
+            ui.label(f"{STAGES.get(job.task, 'Looking')}: {said}").classes("small")
+            with ui.element("div").classes("meter"):
+                ui.element("i").style(f"width: {100 * job.share:.0f}%")
+            if not job.is_cancelled:
+                cancel = ui.button("Cancel", on_click=self._session.cancel, color=None)
+                cancel.props("flat no-caps")
 
     def look(self) -> None:
         """Shows what has changed since it was looked last."""
@@ -242,7 +207,7 @@ def _shown(tab: Tab) -> Any:
     views = (*found.tracks.values(), found.fit, found.compare, found.diagnosis, found.prediction)
     return (
         tab.stage, tab.dark, tab.placing, session.active, session.chosen, session.names,
-        session.error, session.note, session.job is None, tuple(session.states.values()),
+        session.error, session.note, tab.is_idle, tuple(session.states.values()),
         tuple(map(id, views)), found.candidates, found.rounds, tuple(session.broken), session.sheet,
     )  # fmt: skip
 
@@ -258,36 +223,6 @@ def _first_stage(session: Session) -> str:
     return next((s for s in ("track", "fit", "compare") if states[s] != "done"), "diagnose")
 
 
-def _stage_buttons(tab: Tab) -> None:
-    states = tab.session.states
-    running = ""
-    if tab.session.job is not None:
-        running = RUNNING.get(tab.session.job.task, tab.session.job.task)
-    for stage, title in STAGES.items():
-        state = "running" if stage == running else states[stage]
-        button = (
-            ui.element("button").classes("stagebutton").props(f"type=button data-stage={stage}")
-        )
-        if stage == tab.stage:
-            button.props('aria-current="step"')
-        if states[stage] == "locked":
-            button.props("disabled")
-        button.props(f'title="{title}: {_WORDS[state]}" data-state="{state}"')
-        button.on("click", partial(tab.go, stage))
-        with button:
-            ui.element("span").classes(f"lamp {state}")
-            ui.label(title)
-
-
-_WORDS = {
-    "locked": "waiting for the step before it",
-    "open": "to do",
-    "done": "done",
-    "stale": "made with earlier marks",
-    "running": "running",
-}
-
-
 def _panel(tab: Tab) -> None:
     session = tab.session
     if session.error:
@@ -295,12 +230,10 @@ def _panel(tab: Tab) -> None:
     if session.note:
         ui.label(session.note).classes("soft small")
     if len(session.chosen) > 1:
-        with ui.element("div").classes("rowline"):
+        with row():
             for name in session.chosen:
-                look = "main" if name == session.active else "plain"
-                ui.button(name, on_click=partial(session.look_at, name), color=None).props(
-                    "flat no-caps"
-                ).classes(look)
+                look = ui.button(name, on_click=partial(session.look_at, name), color=None)
+                look.props("flat no-caps").classes("main" if name == session.active else "plain")
     is_left = (session.trials.run / "result.json").is_file() and session.results.fit is None
     if is_left and not session.error and tab.stage in ("compare", "diagnose", "predict"):
         ui.label("Opening the run …").classes("soft")
@@ -309,60 +242,27 @@ def _panel(tab: Tab) -> None:
 
 def _figure(tab: Tab) -> Any:
     """The curves below the video."""
-    found, dark = tab.session.results, tab.dark
-    motion = Viewer.motion(tab.session)
-    if tab.stage == "track" or motion is None:
-        track = found.tracks.get(tab.session.active)
-        is_wanted = tab.stage not in ("explain", "video", "marks")
-        if track is None or not is_wanted or tab.session.sheet is None:
+    session, found, stage, dark = tab.session, tab.session.results, tab.stage, tab.dark
+    motion, track = session.motion, found.tracks.get(session.active)
+    if stage == "track" or motion is None:
+        if track is None or session.sheet is None or stage in ("explain", "video", "marks"):
             return None
-        count = tab.session.sheet.info.frame_count
-        return charts.track_figure(track, dark, count / tab.session.sheet.marks.fps)
-    if tab.stage in ("explain", "fit"):
-        return charts.fit_figure(motion, dark)
-    is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
-    stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
-    own = [one for one in stretches if one["clip"] == tab.session.active]
-    if tab.stage == "compare":
-        return charts.residual_figure(motion, own, dark)
-    if tab.stage == "diagnose":
-        return charts.residual_figure(motion, own, dark, _candidate(tab))
-    ahead = (found.prediction or {"clips": {}})["clips"].get(tab.session.active)
-    if tab.stage == "predict" and ahead is not None:
+        end_s = session.sheet.info.frame_count / session.sheet.marks.fps
+        return charts.track_figure(track, dark, end_s)
+    if stage in ("compare", "diagnose"):
+        extra = _candidate(tab) if stage == "diagnose" else None
+        return charts.residual_figure(motion, session.stretches, dark, extra)
+    ahead = (found.prediction or {"clips": {}})["clips"].get(session.active)
+    if stage == "predict" and ahead is not None:
         return charts.prediction_figure(ahead, dark)
-    return charts.fit_figure(motion, dark) if tab.stage == "predict" else None
+    return charts.fit_figure(motion, dark) if stage in ("explain", "fit", "predict") else None
 
 
 def _candidate(tab: Tab) -> tuple[str, Any] | None:
-    results = tab.session.results
-    found = results.diagnosis
-    known = found["curves"] if found is not None else results.previews
+    """The name of the candidate that is looked at and its curve, where the model lacks it."""
+    found = tab.session.results.diagnosis
+    known = found["curves"] if found is not None else tab.session.results.previews
     curves = known.get(tab.candidate, ())
     own = [one for one in curves if one["clip"] == tab.session.active]
     is_in = set(tab.candidate.split("+")) <= set(tab.session.effects)
     return (tab.candidate, own[0]) if own and not is_in else None
-
-
-def _job_bar(session: Session) -> None:
-    job = session.job
-    assert job is not None
-    with ui.element("div").classes("job").props('role="status"'):
-        text = "stopping" if job.is_cancelled else job.stage
-        left = job.time_left(time.monotonic())
-        said = ", ".join(filter(None, (text, left)))
-        ui.label(f"{STAGES.get(job.task, 'Looking')}: {said}").classes("small")
-        with ui.element("div").classes("meter"):
-            ui.element("i").style(f"width: {100 * job.share:.0f}%")
-        if not job.is_cancelled:
-            ui.button("Cancel", on_click=session.cancel, color=None).props("flat no-caps")
-
-
-def _icon(name: str, title: str, action: Callable[[], Any]) -> None:
-    button = ui.button(icon=name, on_click=action, color=None).props("flat round").classes("icon")
-    button.props(f'aria-label="{title}" title="{title}"')
-
-
-def _turn(tab: Tab, dark: Any, show: Callable[[], None]) -> None:
-    tab.dark = not tab.dark
-    dark.value = tab.dark
-    show()

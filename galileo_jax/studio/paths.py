@@ -1,7 +1,7 @@
 """Which files the studio touches: only those below the folder that it was opened on."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,25 +39,26 @@ def safe_name(name: str) -> str:
 
 def videos(root: Path) -> dict[str, Path]:
     """The videos that lie in a folder, by name without suffix; links out of it are left out."""
-    found: dict[str, Path] = {}
-    for path in sorted(root.iterdir()):
-        is_video = path.suffix.lower() in FILM_SUFFIXES and not path.name.startswith(".")
-        if not is_video or path.stem in found or not NAME.fullmatch(path.stem):
-            continue
-        if path.is_file() and path.resolve().is_relative_to(root.resolve()):
-            found[path.stem] = path
-    return found
+    return _lying(root, lambda path: path.suffix.lower() in FILM_SUFFIXES)
 
 
 def tables(root: Path) -> dict[str, Path]:
     """The tables of a folder that a yaml beside them declares, by name without suffix."""
+
+    def is_declared(path: Path) -> bool:
+        declared = yaml_content(path.with_suffix(".yaml")) if is_track(path) else {}
+        return declared.get("track") == path.name
+
+    return _lying(root, is_declared)
+
+
+def _lying(root: Path, is_wanted: Callable[[Path], bool]) -> dict[str, Path]:
+    """Files of a folder, the first of each name."""
     found: dict[str, Path] = {}
     for path in sorted(root.iterdir()):
-        is_plain = is_track(path) and NAME.fullmatch(path.stem) and not path.name.startswith(".")
-        if not is_plain or not path.resolve().is_relative_to(root.resolve()):
-            continue
-        if yaml_content(path.with_suffix(".yaml")).get("track") == path.name:
-            found[path.stem] = path
+        is_plain = NAME.fullmatch(path.stem) and not path.name.startswith(".") and path.is_file()
+        if is_plain and path.resolve().is_relative_to(root.resolve()) and is_wanted(path):
+            found.setdefault(path.stem, path)
     return found
 
 

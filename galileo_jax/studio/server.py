@@ -13,22 +13,17 @@ from urllib.parse import quote
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio import results
 from galileo_jax.studio.guard import Guard
 from galileo_jax.studio.session import Session
-from galileo_jax.studio.upload import LARGEST_BYTES, receive
+from galileo_jax.studio.upload import UPLOAD, receive
 
 HOST = "127.0.0.1"
 FIRST_PORT, NUM_PORTS = 8642, 20
-UPLOAD = "/upload/"
 
 
 def serve(
-    source: str | Path = ".",
-    *,
-    port: int | None = None,
-    browser: bool = True,
-    announce: Callable[[str], object] = lambda _: None,
-    largest_upload: int = LARGEST_BYTES,
+    source: Path, *, port: int | None, browser: bool, announce: Callable[[str], object]
 ) -> None:
     """Serves the studio until it is interrupted.
 
@@ -37,16 +32,15 @@ def serve(
       port: None: the first free one from 8642 on.
       browser: whether to open one.
       announce: is given the address when the server listens.
-      largest_upload: bytes.
 
     Raises:
       InputError: there is no such file or folder, the port is taken, or NiceGUI is missing.
     """
-    root, clip = _source(Path(source))
+    root, clip = _source(source)
     listening = _listening(port)
     number = listening.getsockname()[1]
     token = secrets.token_urlsafe(24)
-    app, session = make_app(root, clip, number, token, largest_upload)
+    app, session = _app(root, clip, number, token)
     import uvicorn
 
     config = uvicorn.Config(
@@ -73,14 +67,8 @@ def serve(
         session.close()
 
 
-def make_app(
-    root: Path, clip: str | None, port: int, token: str, largest_upload: int = LARGEST_BYTES
-) -> tuple[Guard, Session]:
-    """The guarded application, and what its page shows.
-
-    Raises:
-      InputError: NiceGUI is missing.
-    """
+def _app(root: Path, clip: str | None, port: int, token: str) -> tuple[Guard, Session]:
+    """The guarded application, and what its page shows."""
     try:
         from fastapi import FastAPI, Request
         from nicegui import core, ui
@@ -103,24 +91,26 @@ def make_app(
 
     @app.get("/frame/{name}/{index}")
     def frame(name: str, index: int) -> Response:
-        picture = session.picture(name, index)
-        return answer("frame", picture, "image/jpeg", cache_control="private, max-age=3600")
+        kept = "private, max-age=3600"
+        return answer("frame", session.picture(name, index), "image/jpeg", cache_control=kept)
 
     @app.get("/still/{name}")
     def still(name: str) -> Response:
         """The first and the last frame of a clip's prediction."""
-        return answer("picture", session.still(name), "image/png", cache_control="no-store")
+        picture = results.still(session.trials, name)
+        return answer("picture", picture, "image/png", cache_control="no-store")
 
     @app.get("/report/{name}")
     def report(name: str) -> Response:
         """A clip's page, to be kept."""
         kept = f"attachment; filename*=utf-8''{quote(name)}.html"
-        return answer("report", session.report(name), "text/html", content_disposition=kept)
+        page = results.kept_page(session.trials, name)
+        return answer("report", page, "text/html", content_disposition=kept)
 
     @app.put(UPLOAD + "{name}")
     async def upload(name: str, request: Request) -> Response:
         try:
-            path = await receive(session.root, name, request.stream(), largest_upload)
+            path = await receive(session.root, name, request.stream())
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 422)
         session.add(path)
@@ -131,8 +121,7 @@ def make_app(
         app, title="galileo studio", dark=None,
         storage_secret=None, show_welcome_message=False, reconnect_timeout=10.0, tailwind=False,
     )  # fmt: skip
-    guard = Guard(app, port=port, token=token, upload_path=UPLOAD, largest_upload=largest_upload)
-    return guard, session
+    return Guard(app, port=port, token=token), session
 
 
 def _source(path: Path) -> tuple[Path, str | None]:

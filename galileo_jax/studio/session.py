@@ -4,7 +4,7 @@ import asyncio
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.studio import explained, results
+from galileo_jax.studio import results
 from galileo_jax.studio.clip_state import (
     Sheet,
     Table,
@@ -23,17 +23,43 @@ from galileo_jax.studio.clip_state import (
     undone,
 )
 from galileo_jax.studio.frames import Frames
-from galileo_jax.studio.job import Job
-from galileo_jax.studio.jobs import Message, Worker
+from galileo_jax.studio.jobs import Job, Message, Worker
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
 from galileo_jax.studio.paths import tables, videos
-from galileo_jax.studio.shown import Results, with_partial
-from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
+from galileo_jax.studio.results import Results, with_partial
+from galileo_jax.studio.stages import (
+    State,
+    Trials,
+    made,
+    states,
+    track_files,
+    track_mark,
+)
 from galileo_jax.studio.store import Store
 
 MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
 MOST_FRAMES = 4  # clips whose frames are held
+VIEWED = ("compare", "diagnose", "predict")  # whose results are not all in their files
+
+
+@dataclass(frozen=True)
+class Begun:
+    """What a job was begun with.
+
+    Attributes:
+      trials: the clips.
+      clip: the active one.
+      tracks: by clip what its track is made of.
+      of: what a result is made of, by task: that of the model, or of the marks alone.
+      undeclared: clips without a yaml.
+    """
+
+    trials: Trials
+    clip: str
+    tracks: Mapping[str, str]
+    of: Mapping[str, str]
+    undeclared: frozenset[str]
 
 
 class Session:
@@ -61,9 +87,8 @@ class Session:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._asked: Mapping[str, float] | None = None  # the sliders, while an answer is awaited
         self._waiting: Mapping[str, float] | None = None
-        self._context: dict[str, Any] = {}
+        self._begun: Begun | None = None
         self.worker = Worker(str(self.root), self._from_worker)
-        self._effects_left: tuple[str, ...] = ()  # in the result that lies there
         self._unopened: dict[str, Path] = {}
         self.scan()
         if clip is not None and is_track(path := self.root / clip):
@@ -77,11 +102,10 @@ class Session:
     def scan(self) -> None:
         """Looks at the folder again; a video is decoded once to know it, the first ones now."""
         for name, path in {**tables(self.root), **videos(self.root)}.items():
-            if name in self.sheets:
-                continue
-            self._unopened[name] = path
-            if len(self.sheets) < MOST_AT_ONCE:
-                self._open(name)
+            if name not in self.sheets:
+                self._unopened[name] = path
+                if len(self.sheets) < MOST_AT_ONCE:
+                    self._open(name)
         self._changed("clips")
 
     @property
@@ -120,6 +144,11 @@ class Session:
                 self._changed("clips")
         return name in self.sheets
 
+    def _read_again(self, name: str) -> None:
+        """A clip's yaml as somebody else has left it."""
+        if isinstance(sheet := self.sheets.get(name), Sheet):
+            self.sheets[name] = opened(self.root, sheet.source, self.store)
+
     def choose(self, names: tuple[str, ...]) -> None:
         """Which clips are trials of the same objects; the active one is among them."""
         chosen = tuple(name for name in self.names if name in names and self._open(name))
@@ -144,19 +173,6 @@ class Session:
     def trials(self) -> Trials:
         """The chosen clips."""
         return Trials(self.root, tuple(self.sheets[name] for name in self.chosen))
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Of the fitted model, be it opened already or not."""
-        if self.results.fit is not None:
-            return tuple(self.results.fit["effects"])
-        return self._effects_left
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """Of effects of one's own that the last diagnosis was asked to try."""
-        found = self.store.get("runs", self.trials.name).get("files", ())
-        return tuple(str(name) for name in found if (self.root / str(name)).is_file())
 
     @property
     def states(self) -> dict[str, State]:
@@ -199,7 +215,7 @@ class Session:
         self.seen = None
         self._changed("marks", "job")
 
-    # what is understood, and explained
+    # what is understood
 
     def understand(self) -> None:
         """Looks at the active clip, where that has not been done, to say what it shows."""
@@ -216,9 +232,16 @@ class Session:
         name = self.sheets[self.active].source.name
         self._looking = self.worker.ask("understand", clip=name, typed=dict(self.typed))
 
-    def explain(self) -> None:
-        """Says what the chosen clips show: `galileo FILE` with the answers that were typed."""
-        self._start("explain", clips=self.trials.files, typed=dict(self.typed), run=self._run)
+    @property
+    def answered(self) -> tuple[Sheet | Table, ...]:
+        """The chosen clips whose yaml is what `explain` wrote there of a person's answers."""
+        return tuple(
+            sheet
+            for sheet in self.trials.sheets
+            if (text := self.store.get("clips", sheet.name).get("answered"))
+            and sheet.yaml.is_file()
+            and sheet.yaml.read_text(encoding="utf-8") == text
+        )
 
     def answer_anew(self) -> None:
         """Asks again what was asked: what `explain` wrote to the yaml is taken back."""
@@ -234,36 +257,11 @@ class Session:
         self._reopen()
         self.typed = typed
 
-    @property
-    def answered(self) -> tuple[Sheet | Table, ...]:
-        """The chosen clips whose yaml is what `explain` wrote there."""
-        return explained.answered(self.trials, self.store)
-
-    def report(self, name: str) -> str | None:
-        """The page of a chosen clip's run, to be kept as one file; None: there is none."""
-        return explained.report(self.trials, name) if name in self.chosen else None
-
-    def still(self, name: str) -> bytes | None:
-        """The picture of a chosen clip's prediction, PNG; None: there is none."""
-        return explained.still(self.trials, name) if name in self.chosen else None
-
-    def _read_again(self, name: str) -> None:
-        """A clip's yaml as somebody else has left it."""
-        if isinstance(sheet := self.sheets.get(name), Sheet):
-            self.sheets[name] = opened(self.root, sheet.source, self.store)
-
-    def _explained(self, trials: Trials, found: Mapping[str, Any]) -> None:
-        """Remembers what was explained, for the page and for its parts."""
-        explained.remember_answers(trials, self.store, self._context["undeclared"])
-        for sheet in trials.sheets:
-            self._read_again(sheet.name)
-        now = Trials(self.root, tuple(self.sheets[one.name] for one in trials.sheets))
-        self.store.put("runs", now.name, explained.entry(now, found))
-        self.seen = None
-        if now.name == self.trials.name:
-            self._show_stored()
-
     # jobs
+
+    def explain(self) -> None:
+        """Says what the chosen clips show: `galileo FILE` with the answers that were typed."""
+        self._start("explain", clips=self.trials.files, typed=dict(self.typed), run=self._run)
 
     def propose_once(self) -> None:
         """Does what `propose` does, where nothing is drawn yet and nothing is computed."""
@@ -285,17 +283,14 @@ class Session:
         `is_law`: whether one is the formula that the diagnosis proposes, in a file of its
         own.
         """
-        trials, files = self.trials, self.files if effects else ()
+        found = self.store.get("runs", self.trials.name).get("files", ()) if effects else ()
+        files = [str(name) for name in found if (self.root / str(name)).is_file()]  # one's own
         if is_law:
-            files = (*files, f"{self._run}/diagnosis/{PROPOSED}")
+            files.append(f"{self._run}/diagnosis/{PROPOSED}")
         self._start(
-            "fit",
-            clips=trials.files,
-            run=self._run,
-            effects=list(effects),
-            effects_from=list(files),
-            of=trials.made_of(list(files)),
-        )
+            "fit", clips=self.trials.files, run=self._run, effects=list(effects),
+            effects_from=files, of=self.trials.made_of(files),
+        )  # fmt: skip
         self._next = [self.compare]
 
     def compare(self) -> None:
@@ -333,211 +328,6 @@ class Session:
             self._asked = dict(values)
             self.worker.ask("simulate", run=self._run, values=self._asked)
 
-    def close(self) -> None:
-        """Ends the worker."""
-        self.worker.close()
-
-    @property
-    def _run(self) -> str:
-        return str(self.trials.run.relative_to(self.root))
-
-    def _start(self, task: str, **given: Any) -> None:
-        if self.job is not None:
-            self.error = "Something is being computed; cancel it, or wait."
-            self._changed("job")
-            return
-        self._loop = self._loop or asyncio.get_running_loop()
-        self._next = []
-        try:
-            self.trials.run.resolve().relative_to(self.root)
-            self.worker.start(task, **given)
-        except (RuntimeError, ValueError) as error:
-            self.error = f"{task}: {error}"
-            self._changed("job")
-            return
-        trials = self.trials
-        marks = {sheet.name: track_mark(sheet) for sheet in trials.sheets}
-        effects = tuple(given.get("effects", self.effects))
-        self._context = {
-            "trials": trials, "tracks": marks, "clip": self.active,
-            "of": {"marks": trials.made_of(), "model": trials.made_of(effects)},
-            "undeclared": {one.name for one in trials.sheets if not one.yaml.is_file()},
-        }  # fmt: skip
-        self.job, self.error, self.note = Job(task), "", ""
-        self._changed("job")
-
-    def _from_worker(self, message: Message) -> None:
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._receive, message)
-
-    def _receive(self, message: Message) -> None:
-        if message.task == "understand":
-            self._understood(message)
-        elif message.task in ("simulate", "open_run"):
-            self._answered(message)
-        elif message.kind == "progress":
-            stage, share = message.content
-            if self.job is not None:
-                self.job = replace(self.job, stage=stage, share=share)
-                self._changed("job")
-        elif message.kind == "partial":
-            self._partial(message.content)
-        else:
-            self._ended(message)
-
-    def _understood(self, message: Message) -> None:
-        if message.kind in ("progress", "partial") or message.job != self._looking:
-            return
-        self._looking = None
-        self.seen = {"problem": message.content} if message.kind == "error" else message.content
-        self._changed("clips")
-
-    def _partial(self, content: Mapping[str, Any]) -> None:
-        if self._context["trials"].name != self.trials.name:
-            return
-        self.results = with_partial(self.results, content)
-        self._changed("live" if "frame" in content else "results")
-
-    def _ended(self, message: Message) -> None:
-        follow, self._next, self.job = self._next, [], None
-        if message.task == "track" and message.kind != "done":
-            self._set_results(tracks=self._tracks())  # as they were
-        if message.task == "explain" and message.kind != "done":
-            self._back()
-        if message.kind == "done":
-            self._record(message.task, message.content)
-            for action in follow:
-                action()
-        elif message.kind == "cancelled":
-            self.note = "Cancelled; what was finished before is saved."
-        else:
-            self.error = str(message.content)
-        self._changed("job", "clips")
-
-    def _record(self, task: str, content: Mapping[str, Any]) -> None:
-        """Remembers what a result was made of, and shows it."""
-        trials: Trials = self._context["trials"]
-        of = self._context["of"]
-        if task == "propose":
-            self._propose(content["proposal"])
-            return
-        if task == "track":
-            for sheet in trials.sheets:
-                if isinstance(sheet, Table):
-                    continue
-                entry = self.store.get("clips", sheet.name)
-                path = track_files(sheet) / "track_px.csv"
-                mark = made(path, self._context["tracks"][sheet.name])
-                self.store.put("clips", sheet.name, entry | {"tracked": mark})
-            self._changed("results")
-            return
-        if task == "explain":
-            self._explained(trials, content["explained"])
-            return
-        if task == "export":
-            self.note = "Written: " + ", ".join(content["files"])
-            return
-        entry = self.store.get("runs", trials.name)
-        mark = of["marks"] if task in ("fit", "diagnose") else of["model"]
-        path = trials.file(task)
-        if path.is_file():
-            entry[task] = made(path, mark)
-        if task == "fit":
-            new = results.round_of(document(trials.run / "result.json"))
-            is_shown = trials.name == self.trials.name  # with rounds that commands have left
-            known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
-            entry["rounds"] = results.with_round(known, new)
-        if task in ("compare", "predict"):
-            key = {"compare": "compare", "predict": "prediction"}[task]
-            entry[f"{task}_view"] = content[key]
-        if task == "compare" and entry.get("rounds"):
-            entry["rounds"][-1]["p_value"] = content["compare"]["p_value"]
-        if task == "diagnose":
-            entry["diagnose_view"] = content["diagnosis"]
-        self.store.put("runs", trials.name, entry)
-        if trials.name == self.trials.name:
-            self._show_stored()
-
-    def _propose(self, found: Mapping[str, Any]) -> None:
-        sheet = self.sheets.get(self._context["clip"])
-        if not isinstance(sheet, Sheet) or sheet.is_drawn:
-            return
-        marks = proposed(found, sheet.info.size_px)
-        self.sheets[sheet.name] = changed(sheet, marks, self.store)
-        self.note = " ".join(found.get("doubts", ()))
-        self._changed("marks")
-
-    def _answered(self, message: Message) -> None:
-        if message.kind == "progress":
-            return
-        if message.task == "open_run":
-            if message.kind == "done" and self.results.fit is None:
-                self._set_results(fit=message.content["fit"])
-            elif message.kind == "error":
-                self.error = str(message.content)
-                self._changed("job")
-            return
-        self._asked, waiting, self._waiting = None, self._waiting, None
-        if message.kind == "done":
-            self._set_results(live=message.content)
-        if waiting is not None:
-            self.move_model(waiting)
-
-    # results
-
-    def put_back(self) -> None:
-        """The model at its best fit again."""
-        self._set_results(live=None)
-
-    def _reopen(self) -> None:
-        """Shows what lies in the folder for the clips that are chosen now."""
-        self.results, self.seen, self._looking = Results(self._tracks()), None, None
-        self.typed = {}
-        self._show_stored()
-        self._changed("clips", "marks", "results", "job")
-
-    def _tracks(self) -> dict[str, Any]:
-        """Those that lie in the folder, by clip."""
-        tracks = {}
-        for sheet in self.trials.sheets:
-            view = results.pixel_track(track_files(sheet) / "track_px.csv")
-            if view is not None:
-                tracks[sheet.name] = {**view, "clip": sheet.name}
-        return tracks
-
-    def _show_stored(self) -> None:
-        run = self.trials.run
-        entry = self.store.get("runs", self.trials.name)
-        fitted = document(run / FILES["fit"]).get("effects")
-        self._effects_left = tuple(map(str, fitted)) if isinstance(fitted, list) else ()
-        found = document(run / FILES["diagnose"])
-        last = entry.get("diagnose", {}).get("at") if found else None
-        is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
-        curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
-        diagnosis = {"sentence": "", **found, "curves": curves}
-        self._set_results(
-            **explained.told(self.trials, entry),
-            compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
-            prediction=self._prediction(entry),
-            diagnosis=diagnosis if found else None,
-            candidates=tuple(found.get("candidates", ())),
-            rounds=tuple(self._rounds(entry.get("rounds") or list(found.get("history", ())))),
-        )
-
-    def _prediction(self, entry: Mapping[str, Any]) -> Mapping[str, Any] | None:
-        found = entry.get("predict_view", {})
-        is_there = self.trials.file("predict").is_file() and "clips" in found
-        return found if is_there else None
-
-    def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """With that of the fit that lies there, whoever made it."""
-        try:
-            last = results.round_of(document(self.trials.run / FILES["fit"]))
-        except (KeyError, TypeError):
-            return known
-        is_last = bool(known) and set(known[-1]["effects"]) == set(last["effects"])
-        return known if is_last else results.with_round(known, last)
-
     def open_run(self, is_pressed: bool = False) -> None:
         """Loads the chosen clips' fit, if there is one.
 
@@ -550,10 +340,210 @@ class Session:
         try:
             results.check_run(self.root, run, may_run=is_pressed)
         except InputError as error:
-            self.error = " ".join(str(error).split())
-            self._changed("job")
+            self._fail(" ".join(str(error).split()))
             return
         self.worker.ask("open_run", run=os.path.relpath(run, self.root))
+
+    def close(self) -> None:
+        """Ends the worker."""
+        self.worker.close()
+
+    @property
+    def _run(self) -> str:
+        return str(self.trials.run.relative_to(self.root))
+
+    def _fail(self, error: str) -> None:
+        self.error = error
+        self._changed("job")
+
+    def _start(self, task: str, **given: Any) -> None:
+        if self.job is not None:
+            self._fail("Something is being computed; cancel it, or wait.")
+            return
+        self._loop = self._loop or asyncio.get_running_loop()
+        self._next = []
+        trials = self.trials
+        try:
+            trials.run.resolve().relative_to(self.root)
+            self.worker.start(task, **given)
+        except (RuntimeError, ValueError) as error:
+            self._fail(f"{task}: {error}")
+            return
+        marks, model = trials.made_of(), trials.made_of(tuple(given.get("effects", self.effects)))
+        self._begun = Begun(
+            trials,
+            self.active,
+            tracks={sheet.name: track_mark(sheet) for sheet in trials.sheets},
+            of={"fit": marks, "diagnose": marks, "compare": model, "predict": model},
+            undeclared=frozenset(one.name for one in trials.sheets if not one.yaml.is_file()),
+        )
+        self.job, self.error, self.note = Job(task), "", ""
+        self._changed("job")
+
+    # what the worker says
+
+    def _from_worker(self, message: Message) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._receive, message)
+
+    def _receive(self, message: Message) -> None:
+        is_over = message.kind not in ("progress", "partial")
+        if message.task == "understand":
+            if is_over and message.job == self._looking:
+                self._looking = None
+                problem = {"problem": message.content}
+                self.seen = problem if message.kind == "error" else message.content
+                self._changed("clips")
+        elif message.task == "simulate":
+            if is_over:
+                self._simulated(message)
+        elif message.task == "open_run":
+            if message.kind == "done" and self.results.fit is None:
+                self._set_results(fit=message.content["fit"])
+            elif message.kind == "error":
+                self._fail(str(message.content))
+        elif is_over:
+            self._ended(message)
+        elif message.kind == "partial":
+            if self._begun is not None and self._begun.trials.name == self.trials.name:
+                self.results = with_partial(self.results, message.content)
+                self._changed("live" if "frame" in message.content else "results")
+        elif self.job is not None:
+            stage, share = message.content
+            self.job = replace(self.job, stage=stage, share=share)
+            self._changed("job")
+
+    def _simulated(self, message: Message) -> None:
+        self._asked, waiting, self._waiting = None, self._waiting, None
+        if message.kind == "done":
+            self._set_results(live=message.content)
+        if waiting is not None:
+            self.move_model(waiting)
+
+    def _ended(self, message: Message) -> None:
+        follow, self._next, self.job = self._next, [], None
+        if message.kind == "done" and self._begun is not None:
+            self._record(message.task, message.content, self._begun)
+            for action in follow:
+                action()
+        elif message.kind == "cancelled":
+            self.note = "Cancelled; what was finished before is saved."
+        else:
+            self.error = str(message.content)
+        if message.kind != "done" and message.task == "track":
+            self._set_results(tracks=results.tracks(self.trials))  # as they were
+        if message.kind != "done" and message.task == "explain":
+            self._back()
+        self._changed("job", "clips")
+
+    def _record(self, task: str, content: Mapping[str, Any], begun: Begun) -> None:
+        """Remembers what a result was made of, and shows it."""
+        match task:
+            case "propose":
+                self._propose(content["proposal"], begun.clip)
+            case "track":
+                for sheet in begun.trials.sheets:
+                    if isinstance(sheet, Sheet):
+                        path = track_files(sheet) / "track_px.csv"
+                        mark = made(path, begun.tracks[sheet.name])
+                        self._remember(sheet.name, tracked=mark)
+                self._changed("results")
+            case "explain":
+                self._explained(content["explained"], begun)
+            case "export":
+                self.note = "Written: " + ", ".join(content["files"])
+            case _:
+                self._computed(task, content, begun)
+
+    def _remember(self, clip: str, **more: Any) -> None:
+        self.store.put("clips", clip, self.store.get("clips", clip) | more)
+
+    def _propose(self, found: Mapping[str, Any], clip: str) -> None:
+        sheet = self.sheets.get(clip)
+        if isinstance(sheet, Sheet) and not sheet.is_drawn:
+            marks = proposed(found, sheet.info.size_px)
+            self.sheets[clip] = changed(sheet, marks, self.store)
+            self.note = " ".join(found.get("doubts", ()))
+            self._changed("marks")
+
+    def _explained(self, found: Mapping[str, Any], begun: Begun) -> None:
+        """The comparison is of the model without effects: with some it is out of date."""
+        for sheet in begun.trials.sheets:
+            if sheet.name in begun.undeclared and sheet.yaml.is_file():
+                self._remember(sheet.name, answered=sheet.yaml.read_text(encoding="utf-8"))
+            self._read_again(sheet.name)
+        now = Trials(self.root, tuple(self.sheets[one.name] for one in begun.trials.sheets))
+        fitted = made(now.file("fit"), now.made_of())
+        entry: dict[str, Any] = {
+            "fit": fitted,
+            "explained": {**fitted, "paragraph": found["paragraph"], "notes": found["notes"]},
+            "compare": made(now.file("compare"), now.made_of(())),
+            "compare_view": found["compare"],
+        }
+        if found["diagnosis"] is not None:
+            entry["diagnose"] = made(now.file("diagnose"), now.made_of())
+            entry["diagnose_view"] = found["diagnosis"]
+        self.store.put("runs", now.name, entry)
+        self.seen = None
+        if now.name == self.trials.name:
+            self._show_stored()
+
+    def _computed(self, task: str, content: Mapping[str, Any], begun: Begun) -> None:
+        trials, entry = begun.trials, self.store.get("runs", begun.trials.name)
+        is_shown = trials.name == self.trials.name
+        if trials.file(task).is_file():
+            entry[task] = made(trials.file(task), begun.of[task])
+        if task in VIEWED:
+            entry[f"{task}_view"] = content["view"]
+        if task == "fit":
+            new = results.round_of(document(trials.run / "result.json"))
+            known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
+            entry["rounds"] = results.with_round(known, new)  # and those that commands have left
+        if task == "compare" and entry.get("rounds"):
+            entry["rounds"][-1]["p_value"] = content["view"]["p_value"]
+        self.store.put("runs", trials.name, entry)
+        if is_shown:
+            self._show_stored()
+
+    # results
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Of the fitted model, be it opened already or not."""
+        fit = self.results.fit
+        return self.results.effects if fit is None else tuple(fit["effects"])
+
+    @property
+    def motion(self) -> Mapping[str, Any] | None:
+        """The active clip's motion, at the sliders where they were moved."""
+        fit, live = self.results.fit, self.results.live
+        for i, motion in enumerate(fit["motions"] if fit is not None else ()):
+            if motion["clip"] == self.active:
+                return {**motion, **(live["motions"][i] if live is not None else {})}
+        return None
+
+    @property
+    def stretches(self) -> list[Mapping[str, Any]]:
+        """Where the model fails in the active clip; empty while nobody knows of this model."""
+        found = self.results.compare
+        if found is None or self.states["compare"] != "done":
+            return []
+        return [one for one in found["stretches"] if one["clip"] == self.active]
+
+    def put_back(self) -> None:
+        """The model at its best fit again."""
+        self._set_results(live=None)
+
+    def _reopen(self) -> None:
+        """Shows what lies in the folder for the clips that are chosen now."""
+        self.results, self.seen, self._looking = Results(results.tracks(self.trials)), None, None
+        self.typed = {}
+        self._show_stored()
+        self._changed("clips", "marks", "results", "job")
+
+    def _show_stored(self) -> None:
+        entry = self.store.get("runs", self.trials.name)
+        self._set_results(**results.stored(self.trials, entry))
 
     def _set_results(self, **given: Any) -> None:
         self.results = replace(self.results, **given)

@@ -69,30 +69,27 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
     A result without an entry in the store, of a command, is up to date where it is younger than
     the yaml.
     """
-    found: dict[str, State] = {"explain": "open", "video": "done" if trials.sheets else "open"}
-    complete = bool(trials.sheets) and all(sheet.is_complete for sheet in trials.sheets)
-    found["marks"] = "locked" if not trials.sheets else "done" if complete else "open"
-    marks = trials.made_of() if complete else ""
+    found: dict[str, State] = dict.fromkeys(STAGES, "locked")
+    found |= {"explain": "open", "video": "done" if trials.sheets else "open"}
+    if not trials.sheets:
+        return found
+    is_complete = all(sheet.is_complete for sheet in trials.sheets)
+    marks, model = (trials.made_of(), trials.made_of(effects)) if is_complete else ("", "")
     entry = store.get("runs", trials.name)
     fit = _state(trials, "fit", entry, marks)
+    found["marks"] = "done" if is_complete else "open"
     if entry.get("explained", {}).get("at") == changed_at(trials.file("fit")):
         found["explain"] = fit
-    tracked = [_track_state(sheet, store) for sheet in trials.sheets]
-    if not complete:
-        found["track"] = "locked"
-    else:
+    if is_complete:
+        tracked = {_track_state(sheet, store) for sheet in trials.sheets}
         found["track"] = "open" if "open" in tracked else "stale" if "stale" in tracked else "done"
-    is_tracked = found["track"] == "done" or fit == "done"
-    found["fit"] = fit if is_tracked or fit == "stale" else "locked"
-    model = trials.made_of(effects) if complete else ""
-    has_fit = found["fit"] in ("done", "stale")
-    found["compare"] = _state(trials, "compare", entry, model) if has_fit else "locked"
-    found["diagnose"] = _state(trials, "diagnose", entry, marks) if has_fit else "locked"
-    found["predict"] = _state(trials, "predict", entry, model) if has_fit else "locked"
-    if found["fit"] == "stale":
-        for stage in ("compare", "predict"):
-            if found[stage] == "done":
-                found[stage] = "stale"
+    if found["track"] == "done" or fit in ("done", "stale"):
+        found["fit"] = fit
+    if found["fit"] in ("done", "stale"):
+        for stage, of in (("compare", model), ("diagnose", marks), ("predict", model)):
+            state = _state(trials, stage, entry, of)
+            is_of_older = fit == "stale" and state == "done" and stage != "diagnose"
+            found[stage] = "stale" if is_of_older else state
     return found
 
 

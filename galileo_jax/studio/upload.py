@@ -13,6 +13,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.paths import below, check_declared, safe_name
 from galileo_jax.video.decode import probe
 
+UPLOAD = "/upload/"  # the address that takes them
 LARGEST_BYTES = 1_000_000_000
 LARGEST_OTHERS = {
     **dict.fromkeys(TRACK_SUFFIXES, 20_000_000),

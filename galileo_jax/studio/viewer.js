@@ -137,7 +137,6 @@ export default {
       if (this.shown !== this.frame) { this.waiting = true; this.shown = this.frame; }
       if (this.loupe) this.drawLoupe();
     },
-    goTime(time) { this.go(Math.round(time * this.fps)); },
     step(by) { this.go(this.frame + by); },
     play() {
       if (this.timer) { clearInterval(this.timer); this.timer = null; return; }

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 import galileo_jax as gx
+from galileo_jax.report.diagnosis_text import adequacy
 
 MOST_POINTS = 400  # of a curve on the page
-CANDIDATE_POINTS = 90
+CANDIDATE_POINTS, MOST_CURVES = 90, 8  # of the best candidates
 SIGMAS, SHARE = 8.0, 0.6  # how far a slider reaches to either side
 STEPS = 100  # at least, on either side
 WHERE = {  # phases of the motion
@@ -30,14 +31,16 @@ WHERE = {  # phases of the motion
 
 def motion_view(motion: gx.Motion) -> dict[str, Any]:
     """One clip's motion."""
+    plain = {
+        f"{key}{axis}": numbers(values[:, i], digits)
+        for key, values, digits in (("", motion.measured_m, 5), ("sd_", motion.sd_m, 6))
+        for i, axis in enumerate("xy")
+    }
     return {
         "clip": motion.clip,
         "objects": list(motion.objects),
         "times": numbers(motion.times_s, 5),
-        "x": numbers(motion.measured_m[:, 0], 5),
-        "y": numbers(motion.measured_m[:, 1], 5),
-        "sd_x": numbers(motion.sd_m[:, 0], 6),
-        "sd_y": numbers(motion.sd_m[:, 1], 6),
+        **plain,
         "white": numbers(motion.residuals, 3),
         "seen_px": numbers(motion.measured_px, 2),
         "outlines": [numbers(corners, 2) for corners in motion.outlines_px],
@@ -52,26 +55,24 @@ def model_view(motion: gx.Motion) -> dict[str, Any]:
         "model_y": numbers(motion.predicted_m[:, 1], 5),
         "model_px": numbers(motion.predicted_px, 2),
         "turned": numbers(np.degrees(motion.turned_rad), 2),
-        "misfit": round(motion.misfit, 4) if np.isfinite(motion.misfit) else None,
+        "misfit": numbers(motion.misfit, 4),
     }
 
 
 def fit_view(fit: gx.Fit) -> dict[str, Any]:
     """A fit with its motions."""
-    motions = fit.motions()
-    parameters = [
-        {"name": name, "kind": kind, **entry, **_reach(entry)}
-        for kind in ("parameters", "derived")
-        for name, entry in fit.result[kind].items()
-    ]
     return {
         "effects": list(fit.effects),
-        "parameters": parameters,
+        "parameters": [
+            {"name": name, "kind": kind, **entry, **_reach(entry)}
+            for kind in ("parameters", "derived")
+            for name, entry in fit.result[kind].items()
+        ],
         "error": dict(fit.result["error"]),
         "status": fit.result.get("status", ""),
         "warnings": list(fit.warnings),
         "exact": list(fit.taken_as_exact),
-        "motions": [motion_view(motion) for motion in motions],
+        "motions": [motion_view(motion) for motion in fit.motions()],
     }
 
 
@@ -119,40 +120,29 @@ def explanation_view(found: gx.Explanation) -> dict[str, Any]:
 
 def comparison_view(check: gx.Comparison) -> dict[str, Any]:
     """Where a model fails, in words."""
-    from galileo_jax.report import diagnosis_text
-
     stretches = []
     for one in check.paths:
         if one.failing_s is None or one.worst is None:
             continue
-        where = WHERE.get(one.worst.phase, one.worst.phase)
-        stretches.append(
-            {
-                "clip": one.clip,
-                "object": one.index,
-                "start": one.failing_s[0],
-                "end": one.failing_s[1],
-                "sentence": (
-                    f"{one.title}: the model fails most from {one.failing_s[0]:.2f} to "
-                    f"{one.failing_s[1]:.2f} s, in {one.worst.axis} {where}, by "
-                    f"{one.worst.z:.0f} standard deviations."
-                ),
-            }
+        (start, end), worst = one.failing_s, one.worst
+        sentence = (
+            f"{one.title}: the model fails most from {start:.2f} to {end:.2f} s, in {worst.axis} "
+            f"{WHERE.get(worst.phase, worst.phase)}, by {worst.z:.0f} standard deviations."
         )
+        place = {"clip": one.clip, "object": one.index, "start": start, "end": end}
+        stretches.append({**place, "sentence": sentence})
     return {
         "p_value": check.p_value,
         "is_adequate": check.is_adequate,
-        "sentence": diagnosis_text.adequacy(check.found, check.fit.effects),
+        "sentence": adequacy(check.found, check.fit.effects),
         "stretches": stretches,
     }
 
 
-def diagnosis_view(found: gx.Diagnosis, curves: int = 8) -> dict[str, Any]:
+def diagnosis_view(found: gx.Diagnosis) -> dict[str, Any]:
     """What diagnosis.json does not hold: the curves of the best candidates."""
-    drawn = {}
-    for name in found.candidates["effect"][:curves]:
-        drawn[name] = [thin(motion) for motion in found.motions(name)]
-    return {"curves": drawn}
+    names = found.candidates["effect"][:MOST_CURVES]
+    return {"curves": {name: [thin(one) for one in found.motions(name)] for name in names}}
 
 
 def prediction_view(ahead: gx.Prediction) -> dict[str, Any]:
@@ -169,12 +159,12 @@ def prediction_view(ahead: gx.Prediction) -> dict[str, Any]:
 
 def thin(motion: gx.Motion) -> dict[str, Any]:
     """A candidate's curve and the residuals that it leaves."""
-    step = max(1, -(-len(motion.times_s) // CANDIDATE_POINTS))
+    step = thinned(motion.times_s, CANDIDATE_POINTS)
     return {
         "clip": motion.clip,
-        "times": numbers(motion.times_s[::step], 4),
-        "model_x": numbers(motion.predicted_m[:, 0, ::step], 4),
-        "white": numbers(motion.residuals[:, 0, ::step], 2),
+        "times": numbers(motion.times_s[step], 4),
+        "model_x": numbers(motion.predicted_m[:, 0, step], 4),
+        "white": numbers(motion.residuals[:, 0, step], 2),
     }
 
 
@@ -194,15 +184,9 @@ def numbers(values: Any, digits: int) -> Any:
     if values is None:
         return None
     array = np.round(np.asarray(values, float), digits)
-    return _listed(array)
+    return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()
 
 
-def _listed(array: np.ndarray) -> Any:
-    if array.ndim > 1:
-        return [_listed(row) for row in array]
-    return [float(value) if np.isfinite(value) else None for value in array]
-
-
-def thinned(values: Sized) -> slice:
+def thinned(values: Sized, most: int = MOST_POINTS) -> slice:
     """So that a curve has no more points than a page can show."""
-    return slice(None, None, max(1, -(-len(values) // MOST_POINTS)))
+    return slice(None, None, max(1, -(-len(values) // most)))

@@ -1,5 +1,7 @@
 """The jobs: each calls functions of the API, writes what the commands write, and returns a view.
 
+What is there before the end is reported with the progress.
+
 They run in the worker's process, whose working folder is the one that was opened; results that
 are asked for again are kept in its memory.
 """
@@ -25,19 +27,17 @@ from galileo_jax.studio import views
 from galileo_jax.studio.paths import check_declared
 from galileo_jax.studio.store import yaml_content
 
-Partial = Callable[[Mapping[str, Any]], None]
-
 _fits: dict[str, gx.Fit] = {}  # by run and what it was made of
 _MOST_FITS = 12
 _seen: dict[str, tuple[Any, Clip | Understood]] = {}  # by clip, with the state of its files
 
 
-def propose(*, video: str, partial: Partial) -> dict[str, Any]:
+def propose(video: str) -> dict[str, Any]:
     """What a video seems to show."""
     return {"proposal": asdict(gx.propose(video))}
 
 
-def understand(*, clip: str, typed: Mapping[str, str], partial: Partial) -> dict[str, Any]:
+def understand(clip: str, typed: Mapping[str, str]) -> dict[str, Any]:
     """What a clip shows in one sentence, and what is asked of a person."""
     known = _understood(clip, {})
     if isinstance(known, Clip):
@@ -51,9 +51,7 @@ def understand(*, clip: str, typed: Mapping[str, str], partial: Partial) -> dict
     }
 
 
-def explain(
-    *, clips: Sequence[str], typed: Mapping[str, str], run: str, partial: Partial
-) -> dict[str, Any]:
+def explain(clips: Sequence[str], typed: Mapping[str, str], run: str) -> dict[str, Any]:
     """What `galileo FILE` does, with answers as somebody types them there."""
 
     def ask(known: Understood, answers: dict[str, Any]) -> dict[str, Any]:
@@ -94,30 +92,28 @@ def shown(content: Mapping[str, Any] | gx.Explanation) -> dict[str, Any]:
     return given
 
 
-def track(*, clips: Sequence[str], partial: Partial) -> dict[str, Any]:
+def track(clips: Sequence[str]) -> dict[str, Any]:
     """Tracks clips; NAME_track/track_px.csv, and track_m.csv where the scale is known."""
     shown = []
     for i, clip in enumerate(clips):
         with progress.part(i / len(clips), (i + 1) / len(clips)):
             loaded = gx.load(clip)
             names = [item.name for item in loaded.objects]
-            partial({"tracking": {"clip": loaded.path.stem, "objects": names, "fps": loaded.fps}})
+            begun = {"clip": loaded.path.stem, "objects": names, "fps": loaded.fps}
+            progress.report("tracking", 0.0, {"tracking": begun})
             found = gx.track(loaded)
-        found.save_tables(f"{Path(clip).stem}_track")
-        view = views.track_view(found)
-        shown.append(view)
-        partial({"track": view})
+            found.save_tables(f"{Path(clip).stem}_track")
+            shown.append(views.track_view(found))
+            progress.report("tracking", 1.0, {"track": shown[-1]})
     return {"tracks": shown}
 
 
 def fit(
-    *,
     clips: Sequence[str],
     run: str,
     effects: Sequence[str],
     effects_from: Sequence[str],
     of: str,
-    partial: Partial,
 ) -> dict[str, Any]:
     """Fits a model, and writes the run as `galileo fit` does."""
     key = f"{run} {of} {','.join(effects)}"
@@ -126,35 +122,31 @@ def fit(
         if found is None:
             found = gx.fit(list(clips), effects=list(effects), effects_from=list(effects_from))
     view = views.fit_view(found)
-    partial({"fit": view})
-    progress.report("writing the report", 0.95)
+    progress.report("writing the report", 0.95, {"fit": view})
     _keep(key, run, found.save(run))
     return {"fit": view}
 
 
-def compare(*, run: str, partial: Partial) -> dict[str, Any]:
+def compare(run: str) -> dict[str, Any]:
     """Compares a run with its data; RUN/compare."""
     check = gx.compare(_fit_of(run))
     view = views.comparison_view(check)
-    partial({"compare": view})
-    progress.report("writing the page", 0.95)
+    progress.report("writing the page", 0.95, {"compare": view})
     check.save(Path(run) / "compare")
-    return {"compare": view}
+    return {"view": view}
 
 
-def diagnose(
-    *, clips: Sequence[str], run: str, effects_from: Sequence[str], partial: Partial
-) -> dict[str, Any]:
+def diagnose(clips: Sequence[str], run: str, effects_from: Sequence[str]) -> dict[str, Any]:
     """Asks which effect is missing, adds nothing; RUN/diagnosis."""
     found = gx.diagnose(list(clips), add="none", effects_from=list(effects_from))
     view = views.diagnosis_view(found)
-    partial({"verdict": {**view, "document": found.document}})
-    progress.report("writing the page", 0.97)
+    verdict = {**view, "document": found.document}
+    progress.report("writing the page", 0.97, {"verdict": verdict})
     found.save(Path(run) / "diagnosis")
-    return {"diagnosis": view}
+    return {"view": view}
 
 
-def predict(*, run: str, seconds: float, partial: Partial) -> dict[str, Any]:
+def predict(run: str, seconds: float) -> dict[str, Any]:
     """Continues a run beyond its clips, each of them."""
     fit = _fit_of(run)
     clips = {}
@@ -164,21 +156,21 @@ def predict(*, run: str, seconds: float, partial: Partial) -> dict[str, Any]:
             ahead = gx.predict(fit if len(fit.names) == 1 else folder, seconds=seconds)
             ahead.save(folder)
             clips[name] = views.prediction_view(ahead)
-    return {"prediction": {"clips": clips}}
+    return {"view": {"clips": clips}}
 
 
-def export(*, run: str, to: str, partial: Partial) -> dict[str, Any]:
+def export(run: str, to: str) -> dict[str, Any]:
     """Writes a run for other programs."""
     done = gx.export(run, to=to)  # pyright: ignore[reportArgumentType]
     return {"files": [str(path) for path in done.paths]}
 
 
-def open_run(*, run: str, partial: Partial) -> dict[str, Any]:
+def open_run(run: str) -> dict[str, Any]:
     """A run that lies there, of whatever command."""
     return {"fit": views.fit_view(_fit_of(run))}
 
 
-def simulate(*, run: str, values: Mapping[str, float], partial: Partial) -> dict[str, Any]:
+def simulate(run: str, values: Mapping[str, float]) -> dict[str, Any]:
     """Where the model of a run has the objects with other parameters."""
     motions = _fit_of(run).motions(values)
     return {"motions": [views.model_view(one) for one in motions], "values": dict(values)}
@@ -202,15 +194,9 @@ def _keep(key: str, run: str, fit: gx.Fit) -> None:
 
 
 TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
-    "propose": propose,
-    "understand": understand,
-    "explain": explain,
-    "track": track,
-    "fit": fit,
-    "compare": compare,
-    "diagnose": diagnose,
-    "predict": predict,
-    "export": export,
-    "open_run": open_run,
-    "simulate": simulate,
-}
+    one.__name__: one
+    for one in (
+        propose, understand, explain, track, fit, compare, diagnose, predict, export, open_run,
+        simulate,
+    )
+}  # fmt: skip

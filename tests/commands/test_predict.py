@@ -7,12 +7,14 @@ from typing import cast
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from galileo_jax.api.predict import predict
 from galileo_jax.commands import command
 from galileo_jax.commands import predict as predict_command
 from galileo_jax.prediction.extrapolate import crossing_s, extrapolate
-from galileo_jax.report.html_page import document, header
+from galileo_jax.report.html_page import write_page
 from galileo_jax.report.prediction import is_over, prediction_lines
 from galileo_jax.report.side_view import draw_still, view_of
 from galileo_jax.report.style import object_colour, palette
@@ -75,7 +77,7 @@ def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path):
 
 def test_the_report_gets_one_section(runs, tmp_path):
     report = tmp_path / "report.html"
-    report.write_text(document("a fit", [header("fit", "a fit", "It fits."), "<h2>Motion</h2>"]))
+    write_page(report, "fit", "a fit", "It fits.", ["<h2>Motion</h2>"])
     for _ in range(2):
         call(runs["hit"], tmp_path)
         page = report.read_text()
@@ -132,7 +134,11 @@ def test_the_stills_show_where_the_objects_are(runs, tmp_path):
     scene, clip = run.problem.model.scene, run.clip
     start_m = np.array(scene.surroundings.start_m)
     view = view_of(clip, scene, np.stack([start_m, start_m], axis=-1))
-    picture = draw_still(clip, scene, view, start_m)
+    figure = Figure(figsize=(view.width_px / 100, view.height_px / 100), dpi=100)
+    canvas = FigureCanvasAgg(figure)
+    draw_still(figure.add_axes((0, 0, 1, 1)), clip, scene, view, start_m)
+    canvas.draw()
+    picture = np.asarray(canvas.buffer_rgba())[..., :3]
     assert picture.shape == (view.height_px, view.width_px, 3)
     scale = view.width_px / (view.right_m - view.left_m)
     for i, (x, y) in enumerate(start_m):

@@ -21,11 +21,11 @@ from galileo_jax.report.diagnosis_page import (
 )
 from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.provenance import digest
-from tests.found import ERROR, LAW, comparison_of, diagnosis_of, fit_of, make_trials
-from tests.precision import in_64_bit
+from tests.found import ERROR, LAW, comparison_of, diagnosis_of, fit_of
 from tests.report.browser import opened
 from tests.report.references import check_needs_nothing_from_outside
 
+pytestmark = pytest.mark.usefixtures("precision")
 STATUSES = ("none", "named", "ambiguous", "unknown")
 SAYS = {
     "none": "The model is adequate: no effect is missing",
@@ -42,37 +42,29 @@ AGAIN = "galileo diagnose a.yaml --seed 0"
 HOSTILE = '</script><b>&"clip'
 
 
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
-
-
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("clip")
-
-
-@pytest.fixture(scope="module")
-def trials(folder):
-    with in_64_bit():
-        return make_trials(folder)
-
-
-@pytest.fixture(scope="module")
-def clip(trials, folder):
+def clip(trials, trials_folder):
     """The clip that the trials were made of, its second object a ball."""
-    made = load_clip(folder / "oracle.yaml")
+    made = load_clip(trials_folder / "oracle.yaml")
     ball = made.objects[1].model_copy(update={"shape": "sphere", "size_m": (0.03,)})
     return made.model_copy(update={"objects": (made.objects[0], ball)})
 
 
-def write(trials, clip, status: str, page: Path) -> str:
-    diagnosis = diagnosis_of(trials, status)
-    record = diagnosis_document(trials, diagnosis, 0)
-    told = {"truth": "air_drag", "command": AGAIN, "next_command": GO_ON, "seed": 0}
-    write_diagnosis_page(page, HOSTILE, trials, diagnosis, record, [clip], **told)
-    return page.read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def page_of(trials, clip, tmp_path_factory):
+    """The page of a verdict; made once, unless it is to be made anew."""
+    made: dict[str, Path] = {}
+
+    def page(status: str, is_anew: bool = False) -> Path:
+        if status not in made or is_anew:
+            diagnosis = diagnosis_of(trials, status)
+            record = diagnosis_document(trials, diagnosis, 0)
+            made[status] = tmp_path_factory.mktemp(status) / "report.html"
+            told = {"truth": "air_drag", "command": AGAIN, "next_command": GO_ON, "seed": 0}
+            write_diagnosis_page(made[status], HOSTILE, trials, diagnosis, record, [clip], **told)
+        return made[status]
+
+    return page
 
 
 @pytest.mark.parametrize(("left", "says"), [(1.2, True), (2.0, False)])
@@ -86,8 +78,8 @@ def test_what_takes_nearly_all_of_the_error_away_is_said_first(left, says, trial
 
 
 @pytest.mark.parametrize("status", STATUSES)
-def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, tmp_path):
-    page = write(trials, clip, status, tmp_path / "report.html")
+def test_tells_the_verdict_and_needs_nothing_from_outside(status, page_of, clip):
+    page = page_of(status).read_text(encoding="utf-8")
     assert SAYS[status] in page and GO_ON in page and "Truth: air_drag" in page
     assert "<h2" in page and "Why" in page and "the model without effects: p" in page
     assert ">none</td>" in page, "no effect is a hypothesis, too"
@@ -107,10 +99,9 @@ def test_draws_what_each_effect_changed(status, trials, tmp_path):
     assert all("before" in plot.read_text() or "no effects" in plot.read_text() for plot in plots)
 
 
-def test_opens_in_a_browser(trials, clip, tmp_path, browser):
-    write(trials, clip, "named", tmp_path / "report.html")
+def test_opens_in_a_browser(page_of, browser):
     models = ["no effects", "air_drag"]
-    with opened(browser, tmp_path / "report.html") as (page, complaints):
+    with opened(browser, page_of("named")) as (page, complaints):
         moved = page.eval_on_selector_all(
             "[data-of][transform]", "all => all.map(one => [one.dataset.of, one.dataset.object])"
         )
@@ -133,9 +124,9 @@ def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
     assert "foot_transition" not in document, "inside its prior"
 
 
-def test_the_same_diagnosis_gives_the_same_page(trials, clip, tmp_path):
-    first = write(trials, clip, "named", tmp_path / "a.html")
-    assert write(trials, clip, "named", tmp_path / "b.html") == first
+def test_the_same_diagnosis_gives_the_same_page(page_of):
+    first = page_of("named").read_bytes()
+    assert page_of("named", is_anew=True).read_bytes() == first
 
 
 def test_the_worst_stretch_is_where_the_residuals_were_bent(trials):

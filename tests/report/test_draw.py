@@ -81,8 +81,9 @@ def test_charts_side_by_side_are_columns():
     two = side_by_side("two", "two charts", [chart(panel(xlabel=""), panel())] * 2)
     assert two.columns == 2 and len(two.rows) == 2
     figure = plotly_of(two)
-    assert figure.layout.xaxis.domain[1] < figure.layout.xaxis2.domain[0]
-    assert figure.layout.yaxis3.domain[1] < figure.layout.yaxis.domain[0]
+    grid = figure.layout.grid
+    assert (grid.rows, grid.columns) == (2, 2) and 0 < grid.ygap < grid.xgap < 0.5
+    assert figure.layout.xaxis2.matches == "x4"
 
 
 def test_bars_and_boxes_have_categories():

@@ -16,7 +16,7 @@ from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.fit_charts import failing_interval_of
 from galileo_jax.report.fit_page import charts_of_run
 from galileo_jax.report.fit_text import fit_quality, undetermined
-from galileo_jax.report.html_page import document
+from galileo_jax.report.html_page import write_page
 from galileo_jax.report.provenance import digest
 from galileo_jax.report.video_frames import BUDGET_BYTES, sample_frames
 from galileo_jax.results.run import load_run
@@ -30,9 +30,8 @@ PHONE_PX = 390
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    made = make_run(tmp_path_factory.mktemp("hit"), HIT, 1.6)
-    return load_run(made.folder, "c")
+def run(hit_run):
+    return load_run(hit_run.folder, "c")
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +76,8 @@ def test_shows_the_pictures_of_a_video(run, tmp_path, browser):
     clip = filmed(run.clip, tmp_path / "clip.mp4")
     last = len(run.problem.observation.times_s) - 1
     still = np.zeros((2, 2, last + 1))
-    path = tmp_path / "page.html"
-    sections = ["<h1>film</h1>", animation(clip, run.problem, {"fit": still})]
-    path.write_text(document("film", sections), encoding="utf-8")
+    motion = animation(clip, run.problem, {"fit": still})
+    path = write_page(tmp_path / "page.html", "fit", "film", "It moves.", [motion])
     brightness = "one => one.getContext('2d').getImageData(10, 10, 1, 1).data[0]"
     with opened(browser, path) as (shown, complaints):
         shown.wait_for_selector("canvas[data-frame='0']")

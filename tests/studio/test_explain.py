@@ -13,24 +13,15 @@ import galileo_jax as gx
 from galileo_jax.results.run import read_result
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results, work
-from galileo_jax.studio.job import Job
+from galileo_jax.studio.jobs import Job
 from galileo_jax.studio.session import Session
-from tests.missing import needed_module
 from tests.studio.clips import clip_in, still_film
-from tests.studio.hand import LONG_MS, Hand
-from tests.studio.server import started
-from tests.studio.test_page import children_of, opened
+from tests.studio.tab import LONG_MS, Hand, children_of, opened, started
 
 PHONE = (390, 844)
 MOST_CLICKS, MOST_CPU_S = 12, 180.0
 SLOPE = "t (s);s\n" + "".join(f"{t:.2f};{0.4 * t**2:.4f}\n" for t in np.arange(30) / 25)
 NO_MOTION = "time of day;place\nnoon;here\n"
-
-
-@pytest.fixture
-def folder(tmp_path) -> Path:
-    needed_module("nicegui")
-    return tmp_path
 
 
 def is_within(page) -> bool:
@@ -215,7 +206,7 @@ def test_a_table_whose_yaml_leads_out_of_the_folder_is_not_opened(tmp_path, monk
     assert session.sheets == {} and "leads out of" in session.broken["slope"]
     monkeypatch.chdir(path.parent)
     with pytest.raises(InputError, match="leads out of"):
-        work.understand(clip=path.name, typed={}, partial=print)
+        work.understand(clip=path.name, typed={})
 
 
 def test_answers_are_given_anew(tmp_path):

@@ -18,7 +18,7 @@ from galileo_jax.studio.paths import below, safe_name, videos
 from galileo_jax.studio.session import Session
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
-from tests.studio.server import Server, started
+from tests.studio.tab import Server, started
 
 pytestmark = pytest.mark.video
 

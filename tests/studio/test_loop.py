@@ -12,10 +12,7 @@ import galileo_jax as gx
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.results.run import read_result
 from galileo_jax.studio.session import Session
-from tests.missing import needed_module
-from tests.studio.hand import LONG_MS, Hand
-from tests.studio.server import started
-from tests.studio.test_page import opened, wait_until
+from tests.studio.tab import LONG_MS, Hand, opened, started, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]
 
@@ -26,12 +23,6 @@ def stick(folder: Path) -> float:
     assert sheet is not None and sheet.marks.stick is not None
     (x1, _), (x2, _) = sheet.marks.stick
     return x2 - x1
-
-
-@pytest.fixture
-def folder(tmp_path) -> Path:
-    needed_module("nicegui")
-    return tmp_path
 
 
 @pytest.mark.parametrize(

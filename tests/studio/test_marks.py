@@ -7,7 +7,7 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import remarks_on
-from galileo_jax.studio.clip_state import Step, _step, changed, opened, redone, undone
+from galileo_jax.studio.clip_state import History, Step, changed, opened, redone, stored, undone
 from galileo_jax.studio.marks import (
     CORNERS,
     Marks,
@@ -30,10 +30,10 @@ MARKS = Marks(
 )  # fmt: skip
 
 
-def stored(marks: Marks) -> Marks | None:
+def after_json(marks: Marks) -> Marks | None:
     """As they come back from the studio's file."""
-    kept = _step(json.loads(json.dumps(asdict(Step(marks, "")))))
-    return None if kept is None else kept.marks
+    kept = stored(json.loads(json.dumps(asdict(History(Step(marks, ""))))))
+    return None if kept is None else kept.present.marks
 
 
 def apart(one, other) -> float:
@@ -70,7 +70,7 @@ def test_the_frames_that_count_and_corrections_are_declared():
     assert labels(right, again) == {"correct": {"object2": [(12, 203.0, 91.0)]}}
     assert corrected(again, "object2", 12, None) == MARKS
     assert labels(again, MARKS) == {"correct": {"object2": [(12,)]}}
-    assert stored(again) == again
+    assert after_json(again) == again
 
 
 def test_a_rectangle_of_known_sides_takes_the_sticks_place():
@@ -85,7 +85,7 @@ def test_a_rectangle_of_known_sides_takes_the_sticks_place():
     assert labels(MARKS, typed) == {"rectangle": (*corners, 0.5, 0.25)}
     dragged = moved(typed, "corner3", (230.0, 50.0))
     assert labels(typed, dragged)["rectangle"][4:6] == (230.0, 50.0)
-    assert stored(dragged) == dragged
+    assert after_json(dragged) == dragged
     crossed = moved(typed, "corner3", (90.0, 150.0))
     assert any("crossed" in one.sentence for one in remarks_on(crossed, 240.0, None))
     assert "scale" in labels(typed, replace(typed, rectangle=None)), "and back to the stick"
@@ -102,7 +102,7 @@ def test_a_rectangle_in_a_yaml_is_drawn():
 
 
 def test_marks_survive_json_and_everything_in_them_can_be_grabbed():
-    assert stored(MARKS) == MARKS
+    assert after_json(MARKS) == MARKS
     assert set(handles(MARKS)) == {"object1", "object2", "upper", "foot", "stick1", "stick2"}
     more = with_object(MARKS, (5.0, 6.0))
     assert handles(more)["object3"] == (5.0, 6.0)
@@ -145,11 +145,11 @@ def test_marks_that_cannot_be_are_kept_and_explained_but_not_written(tmp_path):
     sheet = changed(sheet, moved(good, "foot", (150.0, 20.0)), store)
     assert video.with_suffix(".yaml").read_text() == text
     assert not sheet.is_complete
-    assert "inside" in (sheet.present.problem or "")
+    assert "inside" in (sheet.history.present.problem or "")
     again = opened(tmp_path, video, Store(tmp_path))
     assert again.marks == sheet.marks, "what was drawn is not lost"
     mended = changed(again, good, store)
-    assert mended.present.problem is None and mended.is_complete
+    assert mended.history.present.problem is None and mended.is_complete
 
 
 @pytest.mark.video

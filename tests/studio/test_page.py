@@ -2,60 +2,25 @@
 
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import galileo_jax as gx
 from galileo_jax.clip.yaml_file import read_mapping
-from tests.missing import needed_module
 from tests.studio.clips import clip_in
-from tests.studio.hand import drag
-from tests.studio.server import Server, started
+from tests.studio.tab import children_of, drag, opened, started, wait_until
 
 pytestmark = pytest.mark.video
-PATIENCE_MS = 60_000  # nothing here takes long; a busy machine may
-
-
-@contextmanager
-def opened(
-    browser, studio: Server, size: tuple[int, int] = (1280, 720), expected: str = "nothing"
-) -> Iterator[Any]:
-    """A tab with the page; it must not complain, but of what is expected."""
-    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE_MS)
-    complaints: list[str] = []
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
-    page.goto(studio.address)
-    page.wait_for_selector("[data-stage=marks]")
-    yield page
-    context.close()
-    assert all(expected in one for one in complaints), complaints
-
-
-def wait_until(is_so: Callable[[], bool]) -> None:
-    """Waits for what the server writes."""
-    end = time.monotonic() + PATIENCE_MS / 1000
-    while not is_so():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.05)
 
 
 def point(video: Path, index: int = 0) -> tuple[float, float]:
     return gx.load(video).objects[index].point_px or (0.0, 0.0)
 
 
-@pytest.fixture
-def folder(tmp_path) -> Path:
-    needed_module("nicegui")
-    clip_in(tmp_path)
-    return tmp_path
+@pytest.fixture(autouse=True)
+def clip(folder) -> Path:
+    return clip_in(folder)
 
 
 def test_marks_are_dragged_undone_and_found_again_after_a_reload(browser, folder):
@@ -162,19 +127,6 @@ def test_killing_the_server_loses_no_mark_and_leaves_no_process(browser, folder)
         assert shown == f"translate({after[0]:g} {after[1]:g})"
         page.click("[aria-label=Undo]")
         wait_until(lambda: point(video) == before)
-
-
-def children_of(pid: int) -> list[int]:
-    """Processes that it has started."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            found.append(int(path.parent.name))
-    return found
 
 
 def is_alive(pid: int) -> bool:

@@ -5,10 +5,15 @@ import json
 import pytest
 
 from galileo_jax.studio import charts
-from galileo_jax.studio.panels.stairs import friction_moves, stairs
-from galileo_jax.studio.results import pixel_track, round_of, with_round
+from galileo_jax.studio.panels.diagnose import friction_moves, stairs
+from galileo_jax.studio.results import (
+    Results,
+    pixel_track,
+    round_of,
+    with_partial,
+    with_round,
+)
 from galileo_jax.studio.session import Session
-from galileo_jax.studio.shown import Results, with_partial
 from tests.studio.clips import clip_in
 
 MOTION = {

@@ -7,20 +7,16 @@ from pathlib import Path
 import pytest
 
 import galileo_jax as gx
-from tests.missing import needed_module
 from tests.studio.clips import clip_in
-from tests.studio.server import started
-from tests.studio.test_page import opened, wait_until
+from tests.studio.tab import opened, started, wait_until
 
 pytestmark = pytest.mark.video
 FRAME = 20
 
 
-@pytest.fixture
-def folder(tmp_path) -> Path:
-    needed_module("nicegui")
-    clip_in(tmp_path)
-    return tmp_path
+@pytest.fixture(autouse=True)
+def clip(folder) -> Path:
+    return clip_in(folder)
 
 
 def go(page, frame: int) -> None:

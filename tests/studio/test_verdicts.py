@@ -14,9 +14,7 @@ import pytest
 
 from galileo_jax.results.run import read_result
 from tests.missing import needed_module
-from tests.studio.hand import LONG_MS, Hand
-from tests.studio.server import started
-from tests.studio.test_page import opened, wait_until
+from tests.studio.tab import LONG_MS, Hand, opened, started, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]
 

@@ -1,24 +1,24 @@
 """What is missing: candidates as they are computed, `Add` and `Remove`, and the staircase."""
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from html import escape
+from typing import Any
 
 from nicegui import ui
 
-from galileo_jax.model.effects.forms import FORM_NAMES as NAMES_OF_FORMS
+from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.report.diagnosis_text import formula_text, strength_texts
+from galileo_jax.results.shown import number, shown
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.studio import charts
-from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
-from galileo_jax.studio.panels.stairs import friction_moves, stairs
+from galileo_jax.studio.panels import parts
 from galileo_jax.studio.paths import below
+from galileo_jax.studio.tab import Tab
 
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
-    from galileo_jax.studio.session import Session
-
-FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
 MOST_SHOWN = 6
+WIDTH, HEIGHT, TOP, BOTTOM = 416, 150, 26, 38  # of the staircase
 OWN_FILE = "my_effect.py"
 OWN_EFFECT = "--effects-from"  # in advice: to write an effect
 TEMPLATE = '''from galileo_jax import Effect, LogNormal, Parameter, register_effect
@@ -39,11 +39,12 @@ class CubicDrag(Effect):
 '''
 
 
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
-    title("What is missing")
+    parts.title("What is missing")
     found, rounds = session.results.diagnosis, session.results.rounds
+    verdict = (found or {}).get("verdict", {})
     if found is not None and found.get("sentence"):
         ui.label(found["sentence"]).classes("say").props("data-verdict")
     if rounds:
@@ -52,125 +53,143 @@ def build(tab: "Tab") -> None:
             for line in friction_moves(rounds):
                 ui.label(line).style("font-variant-numeric: tabular-nums")
     if session.effects:
-        with ui.element("div").classes("rowline"):
+        with parts.row():
             for effect in session.effects:
                 kept = tuple(one for one in session.effects if one != effect)
-                plain_button(
-                    f"Remove {effect}", lambda kept=kept: session.fit(kept), "remove",
-                    session.job is None,
-                )  # fmt: skip
+                parts.plain_button(f"Remove {effect}", partial(session.fit, kept), "remove", tab)
     is_asked = session.job is not None and session.job.task == "diagnose"
     if session.states["diagnose"] != "done" and not is_asked:
         text = "Ask again" if found is not None else "What is missing?"
-        main_button(text, session.diagnose, tab, "diagnose")
-    status = found.get("verdict", {}).get("status") if found is not None else ""
+        parts.main_button(text, session.diagnose, tab, "diagnose")
+    status = verdict.get("status")
     if found is not None and status == "unknown":
         _missing(tab, found)
         _own(tab)
-    for line in found.get("verdict", {}).get("advice", ()) if found is not None else ():
+    for line in verdict.get("advice", ()):
         if OWN_EFFECT not in line:  # which stands here
-            remark("odd", line[:1].upper() + line[1:])
-    for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):
-        _candidate(tab, row, is_best=i == 0)
+            parts.remark("odd", line[:1].upper() + line[1:])
+    for i, entry in enumerate(session.results.candidates[:MOST_SHOWN]):
+        _candidate(tab, entry, verdict.get("law"), is_best=i == 0)
     if found is not None and status != "unknown":
         _missing(tab, found)
         if status == "ambiguous":
             _own(tab)
     if session.effects:
-        main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
+        parts.main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
 
 
-def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
-    session, name = tab.session, str(row["effect"])
-    pick = ui.element("div").classes("pick")
-    pick.props(f'data-candidate="{name}" tabindex=0')
+def _candidate(tab: Tab, entry: Mapping[str, Any], verdict_law: str | None, is_best: bool) -> None:
+    """A row that shows the candidate's curve; `verdict_law`: the formula that was found."""
+    session, name, law = tab.session, str(entry["effect"]), entry.get("law")
+    effects, probability = tuple(name.split("+")), float(entry["probability"] or 0.0)
+    pick = ui.element("div").classes("pick").props(f'data-candidate="{name}" tabindex=0')
     for event in ("mouseenter", "focus", "click"):
         pick.on(event, lambda: tab.preview(name))
-    probability = float(row["probability"] or 0.0)
+    strength = f"velocity error {entry['rmse']:.4f} m/s" if "parameters" not in entry else None
     with pick:
-        law = row.get("law")
         words = name.replace("+", " + ").replace("_", "_\u200b")  # where a line may break
         ui.label(law or words).classes("name")
         ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
         with ui.element("div").classes("bar2"):
             ui.element("i").style(f"width: {100 * probability:.1f}%")
-        ui.label(_strength(row)).classes("strength")
-        effects = tuple(name.split("+"))
-        is_in = set(effects) <= set(session.effects)
-        if FORM_NAMES & set(effects):
+        said = strength or ", ".join(strength_texts(effects, entry, "±").values())
+        ui.label(said).classes("strength")
+        if set(FORM_NAMES) & set(effects):  # they can be tried, not added
             ui.label("form").classes("small soft").props('title="a form without a name"')
             return
-        if law and not _is_verdict(session, law):
+        if law and law != verdict_law:
             ui.label("law").classes("small soft").props('title="a formula that was also tried"')
             return
-        add = ui.button("Added" if is_in else "Add", color=None).props(
-            f'unelevated no-caps data-add="{name}"'
-        )
+        is_in = set(effects) <= set(session.effects)
+        add = ui.button("Added" if is_in else "Add", color=None)
+        add.props(f'unelevated no-caps data-add="{name}"')
         add.classes("main" if is_best and not is_in else "plain")
-        add.set_enabled(not is_in and session.job is None)
-        wanted = effects if law else _joined(session.effects, effects)
+        add.set_enabled(not is_in and tab.is_idle)
+        wanted = effects if law else tuple(dict.fromkeys((*session.effects, *effects)))
         add.on("click.stop", lambda: session.fit(wanted, is_law=bool(law)))
 
 
-def _is_verdict(session: "Session", law: str) -> bool:
-    found = session.results.diagnosis
-    return found is not None and found.get("verdict", {}).get("law") == law
-
-
-def _joined(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*one, *other)))
-
-
-def _strength(row: Mapping[str, Any]) -> str:
-    if "parameters" in row:
-        from galileo_jax.report.diagnosis_text import strength_texts
-
-        effects = str(row["effect"]).split("+")
-        return ", ".join(strength_texts(effects, row, "±").values())
-    return f"velocity error {row['rmse']:.4f} m/s"
-
-
-def _missing(tab: "Tab", found: Mapping[str, Any]) -> None:
+def _missing(tab: Tab, found: Mapping[str, Any]) -> None:
     """The acceleration that the model lacks, or the uneven friction, where there is one."""
     if rows := found.get("friction_along_way"):
-        ui.label("The friction coefficient along the way").classes("small soft")
-        ui.plotly(charts.friction_figure(rows, tab.dark)).style("height: 230px; width: 100%")
-    record = found.get("missing_force")
-    if not record:
-        return
-    ui.label("The acceleration that the model lacks").classes("small soft")
-    ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
-    from galileo_jax.report.diagnosis_text import formula_text
-
-    if text := formula_text(found):
-        ui.label(text).classes("small")
+        _chart("The friction coefficient along the way", charts.friction_figure(rows, tab.dark))
+    if record := found.get("missing_force"):
+        _chart("The acceleration that the model lacks", charts.missing_figure(record, tab.dark))
+        if text := formula_text(found):
+            ui.label(text).classes("small")
 
 
-def _own(tab: "Tab") -> None:
-    """To be unfolded."""
+def _chart(heading: str, figure: Mapping[str, Any]) -> None:
+    ui.label(heading).classes("small soft")
+    ui.plotly(dict(figure)).style("height: 230px; width: 100%")
+
+
+def _own(tab: Tab) -> None:
+    """An editor, to be unfolded."""
+    path = below(tab.session.root, OWN_FILE)
+    text = path.read_text(encoding="utf-8") if path.is_file() else TEMPLATE
     place = ui.expansion("An effect of your own", value=tab.is_writing).classes("w-full")
     place.props("data-own header-class=own")
     place.on_value_change(lambda event: setattr(tab, "is_writing", bool(event.value)))
     with place:
-        _editor(tab)
+        area = ui.textarea(value=text if tab.draft is None else tab.draft).classes("w-full")
+        area.props("outlined autogrow data-effect")
+        area.style("font: 13px ui-monospace, monospace; width: 100%")
+        # The panel is built anew when results come: what is being written stays.
+        area.on_value_change(lambda event: setattr(tab, "draft", event.value))
+
+        def run() -> None:
+            write_text(path, area.value or "")
+            tab.draft = None
+            tab.session.diagnose((OWN_FILE,))
+
+        parts.plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab)
 
 
-def _editor(tab: "Tab") -> None:
-    path = below(tab.session.root, OWN_FILE)
-    text = path.read_text(encoding="utf-8") if path.is_file() else TEMPLATE
-    area = (
-        ui.textarea(value=text if tab.draft is None else tab.draft)
-        .props("outlined autogrow data-effect")
-        .classes("w-full")
+def stairs(rounds: Sequence[Mapping[str, Any]]) -> str:
+    """An SVG: the velocity error of each round on a logarithmic scale, the noise dotted."""
+    errors = [max(float(one["rmse"]), 1e-9) for one in rounds]
+    noise = max(float(rounds[-1]["noise"]), 1e-9)
+    high, low = math.log(max(*errors, noise) * 1.2), math.log(min(*errors, noise) / 1.3)
+
+    def y(value: float) -> float:
+        return TOP + (high - math.log(value)) / (high - low) * (HEIGHT - TOP - BOTTOM)
+
+    step = WIDTH / max(len(rounds), 2)
+    path, texts = "", []
+    for i, (one, error) in enumerate(zip(rounds, errors, strict=True)):
+        left, right = i * step, (i + 1) * step
+        path += f"{'L' if path else 'M'}{left:.1f} {y(error):.1f}L{right:.1f} {y(error):.1f}"
+        name = "+ " + str(one["effects"][-1]) if one["effects"] else "no effects"
+        texts.append(
+            f'<text x="{left + 6:.1f}" y="{y(error) - 7:.1f}" font-weight="600">{error:.4f} m/s'
+            f'</text><text class="soft" x="{left + 6:.1f}" y="{HEIGHT - 20}">{escape(name)}</text>'
+            f'<text class="soft" x="{left + 6:.1f}" y="{HEIGHT - 4}">chi2 '
+            f"{float(one['chi2_per_dof']):.3g}</text>"
+        )
+    floor = y(noise)
+    return (
+        f'<svg class="stairs" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="velocity error '
+        f'round by round"><line x1="0" x2="{WIDTH}" y1="{floor:.1f}" y2="{floor:.1f}" '
+        f'stroke="var(--soft)" stroke-dasharray="3 4"/><text class="soft" x="{WIDTH - 2}" '
+        f'y="{floor + 14:.1f}" text-anchor="end">noise</text>'
+        f'<path d="{path}" fill="none" stroke="var(--accent)" stroke-width="3"/>'
+        f"{''.join(texts)}</svg>"
     )
-    area.style("font: 13px ui-monospace, monospace; width: 100%")
 
-    # The panel is built anew when results come: what is being written stays.
-    area.on_value_change(lambda event: setattr(tab, "draft", event.value))
 
-    def run() -> None:
-        write_text(Path(path), area.value or "")
-        tab.draft = None
-        tab.session.diagnose((OWN_FILE,))
-
-    plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab.session.job is None)
+def friction_moves(rounds: Sequence[Mapping[str, Any]]) -> list[str]:
+    """How the last round moved k1 and k2, in words."""
+    found = []
+    for name in ("k1", "k2"):
+        if name not in rounds[-1]:
+            continue
+        now = rounds[-1][name]
+        text = f"{name} {shown(now)} ± {shown(now, 'sd')}"
+        if len(rounds) > 1 and name in rounds[-2]:
+            before = rounds[-2][name]["mean"]
+            arrow = "↑" if now["mean"] > before else "↓"
+            change = abs(now["mean"] - before)
+            text += f"  {arrow} {number(change, now['sd'])} (from {before:.3g})"
+        found.append(text)
+    return found

@@ -1,54 +1,63 @@
 """Explain: what the film shows in a sentence, what is asked of it, and the result in words."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from nicegui import ui
 
 from galileo_jax.clip.load import YAML_SUFFIXES
 from galileo_jax.clip.track_file import TRACK_SUFFIXES
-from galileo_jax.studio.panels.parts import main_button, on_entered, plain_button, remark, title
+from galileo_jax.studio.panels import parts
+from galileo_jax.studio.tab import Tab
 
 POINTS = "points"  # the question that a click into the video answers
 FILES = ",".join(("video/*", *TRACK_SUFFIXES, *YAML_SUFFIXES))  # that may be dropped
 
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
 
-
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
-    title("Explain")
+    parts.title("Explain")
     ui.label("").classes("said")
     if not session.active:
         for name, problem in session.broken.items():
             ui.label(f"{name}: {problem}").classes("trouble").props("data-sentence")
-        _drop()
-        return
-    seen = session.seen
-    if seen is None:
+    elif (seen := session.seen) is None:
         name = session.sheets[session.active].source.name
         ui.label(f"Looking at {name} …").classes("soft")
     elif "problem" in seen:
         ui.label(seen["problem"]).classes("trouble").props('data-sentence role="alert"')
     else:
         _asked(tab, seen)
-    if session.results.paragraph:
+    if session.active and session.results.paragraph:
         _explained(tab)
     _drop()
 
 
-def _asked(tab: "Tab", seen: Mapping[str, Any]) -> None:
+def drawn(tab: Tab) -> Any:
+    """While this is the same, `Tab.refresh` is enough to show what has changed."""
+    session = tab.session
+    if tab.stage != "explain":
+        return None
+    seen = session.seen or {}
+    asked = tuple((one["key"], one["default"], one["why"]) for one in seen.get("questions", ()))
+    return (
+        "explain", session.active, session.chosen, session.seen is None, seen.get("problem"), asked,
+        session.results.paragraph, session.error, session.note, tab.is_idle, tab.placing,
+        tuple(session.broken),
+    )  # fmt: skip
+
+
+def _asked(tab: Tab, seen: Mapping[str, Any]) -> None:
     """The sentence, the questions and the button; what is typed changes words, and no field."""
     session = tab.session
     sentence = ui.label(seen["sentence"]).classes("say").props("data-sentence")
     words = {one["key"]: _question(tab, one) for one in seen["questions"]}
-    with ui.element("div").classes("rowline"):
-        main_button("Explain", session.explain, tab, "explain")
+    with parts.row():
+        parts.main_button("Explain", session.explain, tab, "explain")
         if not seen["questions"] and session.answered:
-            plain_button("Answer anew", session.answer_anew, "anew", session.job is None)
+            parts.plain_button("Answer anew", session.answer_anew, "anew", tab)
 
     def refresh() -> None:
         now = session.seen or {}
@@ -61,60 +70,38 @@ def _asked(tab: "Tab", seen: Mapping[str, Any]) -> None:
     refresh()
 
 
-def drawn(tab: "Tab") -> Any:
-    """While this is the same, `Tab.refresh` is enough to show what has changed."""
-    session = tab.session
-    if tab.stage != "explain":
-        return None
-    seen = session.seen or {}
-    asked = tuple((one["key"], one["default"], one["why"]) for one in seen.get("questions", ()))
-    return (
-        "explain", session.active, session.chosen, session.seen is None, seen.get("problem"), asked,
-        session.results.paragraph, session.error, session.note, session.job is None,
-        tab.placing, tuple(session.broken),
-    )  # fmt: skip
-
-
-def _question(tab: "Tab", one: Mapping[str, Any]) -> Any:
+def _question(tab: Tab, one: Mapping[str, Any]) -> Any:
     """A question with its field; returns the place of what is wrong with its answer."""
-    key, default = one["key"], one["default"]
+    key, likely = one["key"], one["default"]
     typed = tab.session.typed.get(key)
     with ui.element("div").classes("question").props(f'data-question="{key}"'):
         ui.label(one["text"])
         ui.label(one["why"]).classes("soft small")
         if one["choices"]:
-            field = _choice(one, typed)
+            said = f"{likely}: looks like this one" if key == "scenario" else likely
+            choices = {one: one for one in one["choices"] if one != likely}
+            choices = ({likely: said} if likely else {}) | choices  # the likely one first
+            field = ui.select(choices, value=typed or likely).props("options-dense")
             field.on_value_change(lambda event: tab.session.say(key, str(event.value)))
         else:
-            field = ui.input(value=default or "" if typed is None else typed)
-            on_entered(field, lambda text: tab.session.say(key, text))
+            field = ui.input(value=likely or "" if typed is None else typed)
+            parts.on_entered(field, lambda text: tab.session.say(key, text))
         field.props(f'outlined dense data-answer="{key}" aria-label="{key}"')
         if key == POINTS:
             text = "Click on it in the film" if tab.placing else "Show it in the film"
-            plain_button(text, lambda: _place(tab), "point")
+            parts.plain_button(text, lambda: _place(tab), "point")
         return ui.label("").classes("wrong small")
 
 
-def _choice(one: Mapping[str, Any], typed: str | None) -> Any:
-    """A field with the likely answer first."""
-    likely = one["default"]
-    others = [choice for choice in one["choices"] if choice != likely]
-    said = f"{likely}: looks like this one" if one["key"] == "scenario" else likely
-    shown = ({likely: said} if likely else {}) | {choice: choice for choice in others}
-    return ui.select(shown, value=typed or likely).props("options-dense")
+def _place(tab: Tab) -> None:
+    parts.go_to(0.0)
+    tab.place(POINTS)
 
 
-def _place(tab: "Tab") -> None:
-    tab.placing = "" if tab.placing else POINTS
-    ui.run_javascript("dispatchEvent(new CustomEvent('galileo-go', {detail: 0}))")
-    tab.redraw()
-
-
-def _explained(tab: "Tab") -> None:
+def _explained(tab: Tab) -> None:
     """The paragraph, and its report as a file."""
-    session = tab.session
+    session, job = tab.session, tab.session.job
     ui.label(session.results.paragraph).classes("say").props("data-paragraph")
-    job = session.job
     if job is not None and job.task == "explain":
         ui.label("What is missing is still being asked.").classes("soft")
         return
@@ -126,7 +113,7 @@ def _explained(tab: "Tab") -> None:
             sanitize=False,
         )
     for line in session.results.notes:
-        remark("odd", line)
+        parts.remark("odd", line)
 
 
 def _drop() -> None:

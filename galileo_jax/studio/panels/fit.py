@@ -1,34 +1,29 @@
 """Fit: every parameter with its interval and a slider that moves the model at once."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import ui
 
 from galileo_jax.report.fit_text import distance
 from galileo_jax.results.shown import interval_text, shown, unit_text
-from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
+from galileo_jax.studio.panels import parts
 from galileo_jax.studio.results import program_of
-
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
+from galileo_jax.studio.tab import Tab
 
 
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
-    found = session.results.fit
-    state = session.states["fit"]
     effects = ", ".join(session.effects)
-    title(f"Fit, with {effects}" if effects else "Fit")
-    if found is None:
-        program = program_of(session.trials.run)
-        if program is not None:
+    parts.title(f"Fit, with {effects}" if effects else "Fit")
+    if (found := session.results.fit) is None:
+        if (program := program_of(session.trials.run)) is not None:
             text = f"Run {program.rpartition('/')[2]} and open it"
-            plain_button(text, lambda: session.open_run(is_pressed=True), "open-program")
+            parts.plain_button(text, lambda: session.open_run(is_pressed=True), "open-program")
         elif (session.trials.run / "result.json").is_file():
             ui.label("Opening the run …").classes("soft")
-        main_button("Fit", session.fit, tab, "fit")
+        parts.main_button("Fit", session.fit, tab, "fit")
         return
     error = found["error"]
     with ui.element("div").classes("say"):
@@ -43,19 +38,17 @@ def build(tab: "Tab") -> None:
     for one in found["parameters"]:
         _parameter(tab, one, values)
     ui.timer(0.15, lambda: misfit.set_text(_misfit(tab)))
-    with ui.element("div").classes("rowline"):
-        plain_button("Back to the best", lambda: _back(tab), "back")
-        if state == "stale":
-            main_button("Fit again", lambda: session.fit(session.effects), tab, "fit")
+    with parts.row():
+        parts.plain_button("Back to the best", lambda: _back(tab), "back")
+        if session.states["fit"] == "stale":
+            parts.main_button("Fit again", lambda: session.fit(session.effects), tab, "fit")
         else:
-            main_button("Where does it fail?", lambda: tab.go("compare"), tab, "to-compare")
-    for line in found["warnings"]:
-        remark("odd", line.split(": ", 1)[-1])
-    for line in found["exact"]:
-        remark("odd", line.split(": ", 1)[-1])
+            parts.main_button("Where does it fail?", lambda: tab.go("compare"), tab, "to-compare")
+    for line in (*found["warnings"], *found["exact"]):
+        parts.remark("odd", line.split(": ", 1)[-1])
 
 
-def _misfit(tab: "Tab") -> str:
+def _misfit(tab: Tab) -> str:
     results = tab.session.results
     if results.fit is None:
         return ""
@@ -65,34 +58,30 @@ def _misfit(tab: "Tab") -> str:
     return f"The model misses the points by {rms:.3g} times the noise."
 
 
-def _parameter(tab: "Tab", one: Mapping[str, Any], values: dict[str, float]) -> None:
-    is_known = one["identified"]
+def _parameter(tab: Tab, one: Mapping[str, Any], values: dict[str, float]) -> None:
+    """A parameter with its slider; `values`: where the sliders are, which it changes."""
+    is_known, name = one["identified"], one["name"]
+
+    def move(event: Any) -> None:
+        values[name] = float(event.args)
+        tab.session.move_model(values)
+
     with ui.element("div").classes("parameter" + ("" if is_known else " unknown")):
-        ui.label(one["name"]).classes("name")
+        ui.label(name).classes("name")
         with ui.element("div").classes("value"):
             ui.label(f"{shown(one)}{unit_text(one)}")
-            ui.label(interval_text(one) if is_known else "not determined by this clip").classes(
-                "small soft"
-            )
+            interval = interval_text(one) if is_known else "not determined by this clip"
+            ui.label(interval).classes("small soft")
         if one["kind"] != "parameters":
             ui.label("follows from the others").classes("small soft")
             return
-        start = values.get(one["name"], one["mean"])
+        start = values.get(name, one["mean"])
         slider = ui.slider(min=one["low"], max=one["high"], value=start, step=one["step"])
-        slider.props(f'label data-slider="{one["name"]}" aria-label="{one["name"]}"')
-        slider.on(
-            "update:model-value",
-            lambda event: _move(tab, values, one["name"], event.args),
-            throttle=0.06,
-        )
+        slider.props(f'label data-slider="{name}" aria-label="{name}"')
+        slider.on("update:model-value", move, throttle=0.06)
 
 
-def _move(tab: "Tab", values: dict[str, float], name: str, value: Any) -> None:
-    values[name] = float(value)
-    tab.session.move_model(values)
-
-
-def _back(tab: "Tab") -> None:
+def _back(tab: Tab) -> None:
     tab.session.put_back()
     tab.drawn = None  # the sliders, too
     tab.redraw()

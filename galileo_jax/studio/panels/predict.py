@@ -1,47 +1,39 @@
 """Predict and keep: where it stops, exports, and the commands and API lines that do the same."""
 
 import shlex
-from typing import TYPE_CHECKING
+from functools import partial
 
 from nicegui import ui
 
 from galileo_jax.results.command_line import command_line
-from galileo_jax.studio.panels.parts import main_button, plain_button, title
-
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
+from galileo_jax.studio.panels import parts
+from galileo_jax.studio.tab import Tab
 
 SECONDS = 2.0
 
 
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
     found = (session.results.prediction or {"clips": {}})["clips"].get(session.active)
-    title("Predict")
-    with ui.element("div").classes("rowline"):
+    parts.title("Predict")
+    with parts.row():
         seconds = ui.number("seconds beyond the clip", value=SECONDS, min=0.1, max=60)
         seconds.props("outlined dense step=any")
-        main_button(
-            "Predict", lambda: session.predict(float(seconds.value or SECONDS)), tab, "predict"
-        )
+        go_on = lambda: session.predict(float(seconds.value or SECONDS))  # noqa: E731
+        parts.main_button("Predict", go_on, tab, "predict")
     if found is not None:
         with ui.element("div").classes("answers"):
             for line in found["sentences"]:
                 ui.label(line.strip()).classes("detail" if line.startswith(" ") else "")
         if session.states["predict"] == "done":
-            version = session.versions["results"]
-            ui.html(
-                f'<img class="still" src="/still/{session.active}?{version}" '
-                'alt="the last frame, and where the objects come to rest">',
-                sanitize=False,
-            )
-    title("Keep")
-    with ui.element("div").classes("rowline"):
+            place = f"/still/{session.active}?{session.versions['results']}"
+            seen = "the last frame, and where the objects come to rest"
+            ui.html(f'<img class="still" src="{place}" alt="{seen}">', sanitize=False)
+    parts.title("Keep")
+    with parts.row():
         for kind in ("csv", "netcdf"):
-            plain_button(
-                kind, lambda kind=kind: session.export(kind), f"export-{kind}", session.job is None
-            )
+            parts.plain_button(kind, partial(session.export, kind), f"export-{kind}", tab)
     ui.label(f"runs/{session.trials.name}/report.html").classes("soft small")
     ui.label("The same in the terminal").classes("small soft")
     ui.label(_commands(tab)).classes("code").props("data-commands")
@@ -49,7 +41,7 @@ def build(tab: "Tab") -> None:
     ui.label(_lines(tab)).classes("code").props("data-lines")
 
 
-def _commands(tab: "Tab") -> str:
+def _commands(tab: Tab) -> str:
     session = tab.session
     clips, run = session.trials.files, f"runs/{session.trials.name}"
     lines = [f"cd {shlex.quote(str(session.root))}"]
@@ -65,7 +57,7 @@ def _commands(tab: "Tab") -> str:
     return "\n".join(lines)
 
 
-def _lines(tab: "Tab") -> str:
+def _lines(tab: Tab) -> str:
     session = tab.session
     files = session.trials.files
     clips = repr(files[0]) if len(files) == 1 else repr(files)

@@ -2,23 +2,20 @@
 
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import ui
 
 from galileo_jax.studio.marks import Marks, corrected
-from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
-
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
+from galileo_jax.studio.panels import parts
+from galileo_jax.studio.tab import Tab
 
 
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
-    title("Track")
+    parts.title("Track")
     track = session.results.tracks.get(session.active)
-    state = session.states["track"]
     if track is None:
         ui.label("The program follows every object through the video.").classes("soft")
     elif track.get("is_running"):
@@ -26,20 +23,17 @@ def build(tab: "Tab") -> None:
         return
     else:
         _found(track)
-    if track is not None and session.sheet is not None:
-        _put_right(tab, session.sheet.marks)
+        if session.sheet is not None:
+            _put_right(tab, session.sheet.marks)
+    state = session.states["track"]
     if state != "done":
-        main_button("Track again" if state == "stale" else "Track", session.track, tab, "track")
+        text = "Track again" if state == "stale" else "Track"
+        parts.main_button(text, session.track, tab, "track")
     elif session.states["fit"] in ("open", "stale"):
-        main_button("Fit", lambda: _fit(tab), tab, "fit")
-        plain_button("Track again", session.track, "again", session.job is None)
+        parts.main_button("Fit", lambda: tab.go_on("fit", session.fit), tab, "fit")
+        parts.plain_button("Track again", session.track, "again", tab)
     else:
-        main_button("Fit", lambda: tab.go("fit"), tab, "to-fit")
-
-
-def _fit(tab: "Tab") -> None:
-    tab.go("fit")
-    tab.session.fit()
+        parts.main_button("Fit", lambda: tab.go("fit"), tab, "to-fit")
 
 
 def _found(track: Mapping[str, Any]) -> None:
@@ -50,45 +44,34 @@ def _found(track: Mapping[str, Any]) -> None:
     ):
         seen = [i for i, place in enumerate(places) if place[0] is not None]
         if not seen:
-            remark("missing", f"{name} was not seen in any frame.")
+            parts.remark("missing", f"{name} was not seen in any frame.")
             continue
-        sds = sorted(max(errors[i]) for i in seen)
+        sd = sorted(max(errors[i]) for i in seen)[len(seen) // 2]
         kind = "fine" if len(seen) > 0.9 * frames else "odd"
-        remark(
-            kind,
-            f"{name}: seen in {len(seen)} of {frames} frames, to {sds[len(sds) // 2]:.2f} px.",
-        )
+        parts.remark(kind, f"{name}: seen in {len(seen)} of {frames} frames, to {sd:.2f} px.")
     for warning in track["warnings"]:
-        remark("odd", warning)
+        parts.remark("odd", warning)
 
 
-def _put_right(tab: "Tab", marks: Marks) -> None:
+def _put_right(tab: Tab, marks: Marks) -> None:
     """A lost object: go to the first wrong frame, click on it, and it is followed from there."""
     if tab.placing:
         ui.label(f"Click on the middle of {tab.placing} in the video.").classes("say")
-        plain_button("Never mind", lambda: _place(tab, ""), "place-none")
+        parts.plain_button("Never mind", lambda: tab.place(""), "place-none")
         return
     ui.label("If a path leaves its object, go to the first wrong frame:").classes("soft small")
-    with ui.element("div").classes("rowline"):
-        for one in marks.objects:
-            plain_button(
-                f"{one.name} is lost here", partial(_place, tab, one.name), f"right-{one.name}",
-                tab.session.job is None,
-            )  # fmt: skip
+    with parts.row():
+        for name in (one.name for one in marks.objects):
+            lost = partial(tab.place, name)
+            parts.plain_button(f"{name} is lost here", lost, f"right-{name}", tab)
     for one in marks.objects:
         for frame, _, _ in one.corrections:
-            with ui.element("div").classes("rowline"):
+            with parts.row():
                 ui.label(f"{one.name} was corrected in frame {frame}").classes("soft")
-                drop = ui.button(icon="close", color=None).props("flat round").classes("icon")
-                drop.props(f'aria-label="Take back frame {frame} of {one.name}"')
-                drop.on("click", partial(_take_back, tab, one.name, frame))
+                back = partial(_take_back, tab, one.name, frame)
+                parts.icon_button("close", f"Take back frame {frame} of {one.name}", back)
 
 
-def _place(tab: "Tab", name: str) -> None:
-    tab.placing = name
-    tab.redraw()
-
-
-def _take_back(tab: "Tab", name: str, frame: int) -> None:
+def _take_back(tab: Tab, name: str, frame: int) -> None:
     if tab.session.sheet is not None:
         tab.mark(corrected(tab.session.sheet.marks, name, frame, None))

@@ -1,83 +1,79 @@
 """Video: which clip, or which trials; its frame rate, and from which frame on it counts."""
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nicegui import ui
 
-from galileo_jax.studio.panels.parts import main_button, on_number, plain_button, remark, title
-
-if TYPE_CHECKING:
-    from galileo_jax.studio.page import Tab
+from galileo_jax.studio.panels import parts
+from galileo_jax.studio.tab import Tab
 
 
-def build(tab: "Tab") -> None:
+def build(tab: Tab) -> None:
     """The panel."""
     session = tab.session
-    title("Video")
+    parts.title("Video")
     for name, problem in session.broken.items():
         ui.label(f"{name}: {problem}").classes("trouble")
     if not session.names:
         ui.label(f"No video in {session.root}.").classes("soft")
         return
     _clips(tab)
-    sheet = session.sheet
-    if sheet is None:
+    if (sheet := session.sheet) is None:
         return
-    info = sheet.info
+    info, marks = sheet.info, sheet.marks
     ui.label(
         f"{sheet.source.name}: {info.frame_count} frames, {info.size_px[0]} x {info.size_px[1]}"
     ).classes("soft")
-    with ui.element("div").classes("rowline"):
-        rate = ui.number("true frames per second", value=sheet.marks.fps, min=1)
-        rate.props("outlined dense data-fps step=any")
-        on_number(rate, lambda value: tab.change(fps=value) if value else None)
-    with ui.element("div").classes("rowline"):
-        first = ui.number("counts from frame", value=sheet.marks.first_frame, min=0, precision=0)
-        first.props("outlined dense data-first").style("width: 150px")
-        on_number(first, lambda value: tab.change(first_frame=int(value or 0)))
-        plain_button("this frame", lambda: tab.change(first_frame=tab.frame), "from-here")
-    with ui.element("div").classes("rowline"):
-        end = info.frame_count - 1
-        shown = end if sheet.marks.last_frame is None else sheet.marks.last_frame
-        last = ui.number("counts to frame", value=shown, min=0, precision=0)
-        last.props("outlined dense data-last").style("width: 150px")
-        on_number(last, lambda value: _to(tab, value))
-        plain_button("this frame", lambda: _to(tab, tab.frame), "to-here")
+    with parts.row():
+        parts.number_field(
+            "true frames per second", marks.fps,
+            lambda value: tab.change(fps=value) if value else None, "data-fps step=any", min=1,
+        )  # fmt: skip
+    end = info.frame_count - 1
+
+    def begin(frame: float | None) -> None:
+        tab.change(first_frame=int(frame or 0))
+
+    def stop(frame: float | None) -> None:
+        is_last = frame is None or int(frame) == end
+        tab.change(last_frame=None if is_last else int(frame or 0))
+
+    last = end if marks.last_frame is None else marks.last_frame
+    _frame(tab, "counts from frame", marks.first_frame, begin, "data-first", "from-here")
+    _frame(tab, "counts to frame", last, stop, "data-last", "to-here")
     for one in sheet.remarks:
         if "frame" in one.sentence:
-            remark(one.kind, one.sentence)
+            parts.remark(one.kind, one.sentence)
     for warning in info.warnings:
-        remark("odd", warning.split(": ", 1)[-1])
-    main_button("Mark", lambda: tab.go("marks"), tab, "to-marks")
+        parts.remark("odd", warning.split(": ", 1)[-1])
+    parts.main_button("Mark", lambda: tab.go("marks"), tab, "to-marks")
 
 
-def _clips(tab: "Tab") -> None:
+def _frame(
+    tab: Tab, label: str, value: int, action: Callable[[float | None], None], mark: str, here: str
+) -> None:
+    """A field of a frame's number, and a button for the one that is shown."""
+    with parts.row():
+        parts.number_field(label, value, action, mark, min=0, precision=0).style("width: 150px")
+        parts.plain_button("this frame", lambda: action(tab.frame), here)
+
+
+def _clips(tab: Tab) -> None:
     session = tab.session
-    names = session.names
-    if len(names) == 1:
+    if len(session.names) == 1:
         return
     ui.label("Clips; those that are ticked are trials of the same objects").classes("small soft")
-    for name in names:
-        with ui.element("div").classes("rowline").style("flex-wrap: nowrap"):
-            box = ui.checkbox(value=name in session.chosen).props(
-                f'data-trial="{name}" aria-label="{name} is a trial"'
-            )
+    for name in session.names:
+        with parts.row(is_one_line=True):
+            box = ui.checkbox(value=name in session.chosen)
+            box.props(f'data-trial="{name}" aria-label="{name} is a trial"')
             box.on_value_change(lambda event, name=name: _tick(tab, name, bool(event.value)))
-            ui.button(name, on_click=partial(session.show, name), color=None).props(
-                f'flat no-caps data-clip="{name}"'
-            ).classes("main" if name == session.active else "plain")
+            look = ui.button(name, on_click=partial(session.show, name), color=None)
+            look.props(f'flat no-caps data-clip="{name}"')
+            look.classes("main" if name == session.active else "plain")
 
 
-def _tick(tab: "Tab", name: str, is_on: bool) -> None:
-    session = tab.session
-    names = {*session.chosen, name} if is_on else {one for one in session.chosen if one != name}
-    session.choose(tuple(names))
-
-
-def _to(tab: "Tab", frame: float | None) -> None:
-    """The last frame that counts; the clip's own where none is given."""
-    sheet = tab.session.sheet
-    if sheet is not None:
-        is_last = frame is None or int(frame) == sheet.info.frame_count - 1
-        tab.change(last_frame=None if is_last else int(frame or 0))
+def _tick(tab: Tab, name: str, is_on: bool) -> None:
+    chosen = set(tab.session.chosen)
+    tab.session.choose(tuple(chosen | {name} if is_on else chosen - {name}))
