@@ -1,5 +1,6 @@
 """Curves for the page: the reports' kinds of chart, as plain data in the studio's frame."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,11 +10,9 @@ import numpy as np
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.report.chart import Band, Chart, Line, Panel, Points, time_limits
 from galileo_jax.report.diagnosis_charts import friction_chart, known_objects, missing_force_chart
-from galileo_jax.report.plotly_figure import dark, figure
+from galileo_jax.report.plotly_figure import dark, figure, to_json
 from galileo_jax.report.style import object_colour
-from galileo_jax.studio.views import numbers
 
-FIGURES = 6  # after the point, of what is drawn
 LAYOUT = {
     "paper_bgcolor": "rgba(0,0,0,0)",
     "margin": {"l": 58, "r": 12, "t": 8, "b": 36},
@@ -117,17 +116,8 @@ def _figure(panel: Panel, is_dark: bool) -> dict[str, Any]:
 
 
 def _figure_of(chart: Chart, is_dark: bool) -> dict[str, Any]:
-    drawn = _plain(figure(chart))
+    drawn = json.loads(to_json(figure(chart)))  # without arrays: tabs compare it
     keeps_zoom = {"uirevision": chart.panels[0].ylabel if chart.panels[0] else ""}
     drawn["layout"] |= LAYOUT | keeps_zoom
     drawn["layout"]["template"]["layout"]["yaxis"]["automargin"] = True
     return (dark(drawn) if is_dark else drawn) | {"config": CONFIG}
-
-
-def _plain(drawn: Any) -> Any:
-    """The figure with lists for arrays: tabs compare it with what they show."""
-    if isinstance(drawn, dict):
-        return {key: _plain(part) for key, part in drawn.items()}
-    if isinstance(drawn, list | tuple):
-        return [_plain(part) for part in drawn]
-    return numbers(drawn, FIGURES) if isinstance(drawn, np.ndarray) else drawn
