@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,16 +16,10 @@ from galileo_jax.studio.clip_state import (
     Sheet,
     Table,
     changed,
-    opened,
-    opened_table,
-    redone,
-    undone,
 )
-from galileo_jax.studio.frames import Frames
+from galileo_jax.studio.clips import Clips
 from galileo_jax.studio.jobs import Job, Message, Worker
-from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
-from galileo_jax.studio.paths import tables, videos
 from galileo_jax.studio.results import Results, with_partial
 from galileo_jax.studio.stages import (
     State,
@@ -36,10 +29,7 @@ from galileo_jax.studio.stages import (
     track_files,
     track_mark,
 )
-from galileo_jax.studio.store import Store
 
-MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
-MOST_FRAMES = 4  # clips whose frames are held
 VIEWED = ("compare", "diagnose", "predict")  # whose results are not all in their files
 
 
@@ -62,34 +52,25 @@ class Begun:
     undeclared: frozenset[str]
 
 
-class Session:
+class Session(Clips):
     """State of the studio; all of it is changed in the server's loop.
 
     `clip`: which of its clips is shown first, a table with its suffix; None: the first.
     """
 
     def __init__(self, root: Path, clip: str | None = None):
-        self.root, self.store = root.resolve(), Store(root)
-        self.sheets: dict[str, Sheet | Table] = {}
-        self.broken: dict[str, str] = {}
-        self.active = ""
-        self.chosen: tuple[str, ...] = ()
+        super().__init__(root)
         self.job: Job | None = None
-        self.error = ""
         self.note = ""
         self.results = Results({})
-        self.seen: Mapping[str, Any] | None = None  # what is understood of the active clip
-        self.typed: dict[str, str] = {}  # answers to what is asked of it
+        self.typed: dict[str, str] = {}  # answers to what is asked of the active clip
         self._looking: int | None = None  # the question to the worker that is waited for
-        self.versions: Counter[str] = Counter()
-        self._frames: dict[str, Frames] = {}
         self._next: list[Callable[[], None]] = []
         self._loop: asyncio.AbstractEventLoop | None = None
         self._asked: Mapping[str, float] | None = None  # the sliders, while an answer is awaited
         self._waiting: Mapping[str, float] | None = None
         self._begun: Begun | None = None
         self.worker = Worker(str(self.root), self._from_worker)
-        self._unopened: dict[str, Path] = {}
         self.scan()
         if clip is not None and is_track(path := self.root / clip):
             self.add(path)
@@ -98,20 +79,6 @@ class Session:
             self.show(clip if clip and is_known else next(iter(self.names), ""))
 
     # clips
-
-    def scan(self) -> None:
-        """Looks at the folder again; a video is decoded once to know it, the first ones now."""
-        for name, path in {**tables(self.root), **videos(self.root)}.items():
-            if name not in self.sheets:
-                self._unopened[name] = path
-                if len(self.sheets) < MOST_AT_ONCE:
-                    self._open(name)
-        self._changed("clips")
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of all clips that can be shown."""
-        return tuple(sorted({*self.sheets, *self._unopened}))
 
     def add(self, path: Path) -> None:
         """Takes in a film, a table or a yaml that was opened or dropped, and turns to it."""
@@ -130,25 +97,6 @@ class Session:
             self.active, self.chosen = name, (name,)
             self._reopen()
 
-    def _open(self, name: str) -> bool:
-        path = self._unopened.pop(name, None)
-        if path is not None:
-            try:
-                if is_track(path):
-                    self.sheets[name] = opened_table(self.root, path)
-                else:
-                    self.sheets[name] = opened(self.root, path, self.store)
-                self.broken.pop(name, None)
-            except InputError as error:
-                self.broken[name] = str(error).replace(f"{path}: ", "")
-                self._changed("clips")
-        return name in self.sheets
-
-    def _read_again(self, name: str) -> None:
-        """A clip's yaml as somebody else has left it."""
-        if isinstance(sheet := self.sheets.get(name), Sheet):
-            self.sheets[name] = opened(self.root, sheet.source, self.store)
-
     def choose(self, names: tuple[str, ...]) -> None:
         """Which clips are trials of the same objects; the active one is among them."""
         chosen = tuple(name for name in self.names if name in names and self._open(name))
@@ -164,56 +112,9 @@ class Session:
             self._changed("clips", "marks", "results")
 
     @property
-    def sheet(self) -> Sheet | None:
-        """The active clip's; None where that is a table."""
-        found = self.sheets.get(self.active)
-        return found if isinstance(found, Sheet) else None
-
-    @property
-    def trials(self) -> Trials:
-        """The chosen clips."""
-        return Trials(self.root, tuple(self.sheets[name] for name in self.chosen))
-
-    @property
     def states(self) -> dict[str, State]:
         """Of the stages."""
         return states(self.trials, self.store, self.effects)
-
-    def picture(self, name: str, index: int) -> bytes | None:
-        """A frame of a clip, JPEG."""
-        sheet = self.sheets.get(name)
-        if not isinstance(sheet, Sheet):
-            return None
-        if name not in self._frames:
-            while len(self._frames) >= MOST_FRAMES:
-                self._frames.pop(next(iter(self._frames)))
-            self._frames[name] = Frames(sheet.source)
-        return self._frames[name].picture(index)
-
-    # marks
-
-    def mark(self, marks: Marks) -> None:
-        """Draws, and writes it to the yaml at once."""
-        self._set_sheet(lambda sheet: changed(sheet, marks, self.store))
-
-    def undo(self) -> None:
-        """One step of the active clip's marks back."""
-        self._set_sheet(lambda sheet: undone(sheet, self.store))
-
-    def redo(self) -> None:
-        """And forth."""
-        self._set_sheet(lambda sheet: redone(sheet, self.store))
-
-    def _set_sheet(self, change: Callable[[Sheet], Sheet]) -> None:
-        if self.sheet is None:
-            return
-        try:
-            self.sheets[self.active] = change(self.sheet)
-            self.error = ""
-        except (InputError, OSError) as error:
-            self.error = " ".join(str(error).split())
-        self.seen = None
-        self._changed("marks", "job")
 
     # what is understood
 
@@ -548,7 +449,3 @@ class Session:
     def _set_results(self, **given: Any) -> None:
         self.results = replace(self.results, **given)
         self._changed("live" if set(given) == {"live"} else "results")
-
-    def _changed(self, *parts: str) -> None:
-        for part in parts:
-            self.versions[part] += 1

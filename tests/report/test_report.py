@@ -10,11 +10,10 @@ import pytest
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.prediction.posterior_predictive import posterior_predictive
-from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
 from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.fit_charts import failing_interval_of
-from galileo_jax.report.fit_page import charts_of_run
+from galileo_jax.report.fit_page import charts_of_run, write_report
 from galileo_jax.report.fit_text import fit_quality, undetermined
 from galileo_jax.report.html_page import write_page
 from galileo_jax.report.provenance import digest

@@ -166,7 +166,7 @@ def test_trials_are_chosen_and_named_as_the_commands_name_them(tmp_path):
 
 @pytest.mark.video
 def test_of_a_large_folder_a_clip_is_opened_when_it_is_turned_to(tmp_path, monkeypatch):
-    monkeypatch.setattr("galileo_jax.studio.session.MOST_AT_ONCE", 1)
+    monkeypatch.setattr("galileo_jax.studio.clips.MOST_AT_ONCE", 1)
     for name in ("a", "b", "c"):
         clip_in(tmp_path, name)
     (tmp_path / "b.mp4").write_bytes(b"no video")
