@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.explain import Explanation, explain
     from galileo_jax.api.export import export
     from galileo_jax.api.fit import fit
-    from galileo_jax.api.fit_result import Fit
+    from galileo_jax.api.fit_result import Fit, load_run
     from galileo_jax.api.fit_tosses import TossFit, fit_tosses
     from galileo_jax.api.label import label
     from galileo_jax.api.look import Look, look
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from galileo_jax.api.next_experiment import NextExperiment, next_experiment
     from galileo_jax.api.predict import Prediction, predict
     from galileo_jax.api.propose import Proposal, propose
-    from galileo_jax.api.run import load_run
     from galileo_jax.api.simulate import Simulated, simulate
     from galileo_jax.api.track import Track, track
     from galileo_jax.api.train import train

@@ -5,6 +5,7 @@ the results, the versions and the command. It has no film, no picture and nothin
 (`results/impersonal.py`).
 """
 
+import contextlib
 import json
 import platform
 import shlex
@@ -12,7 +13,7 @@ import tempfile
 import traceback
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,11 +46,11 @@ OF_OBJECTS = {"point_px", "corrections", "track_name", "track_file"}
 
 READ_ME = """What galileo FILE --bundle wrote, for somebody who is to find out what went wrong.
 
-To do the same again, unpack it and call:  galileo {tracks}
-
+{again}
 There is no film and no picture in it, and no name of a file, folder, user or computer.
 {files}
 """
+AGAIN = "To do the same again, unpack it and call:  galileo {tracks}\n"
 WHAT = {
     "command.txt": "the call",
     "versions.json": "of the program, Python, its packages and the operating system",
@@ -82,16 +83,6 @@ class Bundle:
         )
 
 
-@dataclass(frozen=True)
-class _Content:
-    """What goes into a bundle: texts and bytes by name, still with all names."""
-
-    texts: Mapping[str, str] = field(default_factory=dict)
-    documents: Mapping[str, Any] = field(default_factory=dict)
-    tracks: Sequence[Measurement] = ()
-    declared: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-
-
 def bundle_of(
     found: "Explanation",
     path: str | Path,
@@ -102,10 +93,7 @@ def bundle_of(
     """Writes the bundle of what was explained.
 
     `command`: the words of the call; none: those that do the same. `others`: words that are not
-    to be in it, to what is said instead.
-
-    Raises:
-      InputError: the file cannot be written.
+    to be in it, to what is said instead. Raises `InputError` where it cannot be written.
     """
     measured = found.fit.measurements
     names = [item.name for item in measured[0].clip.objects]
@@ -113,18 +101,13 @@ def bundle_of(
     documents = {"result.json": found.fit.result, "compare.json": found.check_document}
     if found.diagnosis is not None:
         documents["diagnosis.json"] = found.diagnosis.document
-    looks = "\n\n".join(one.summary() for one in found.looks)
     texts = {
         "command.txt": _command(command or shlex.split(found.command), hidden),
-        "look.txt": looks,
+        "look.txt": "\n\n".join(one.summary() for one in found.looks),
         "paragraph.txt": found.paragraph,
     }
-    declared = {
-        f"clip{n}_declared.yaml": _declared(one.clip)
-        for n, one in enumerate(measured, 1)
-        if one.clip.video is not None
-    }
-    return _written(Path(path), _Content(texts, documents, measured, declared), hidden)
+    declared = [{} if one.clip.video is None else _declared(one.clip) for one in measured]
+    return _written(Path(path), hidden, texts, declared, measured, documents)
 
 
 def bundle_of_failure(
@@ -139,31 +122,21 @@ def bundle_of_failure(
     """Writes the bundle of a call that failed: what was understood, and why it stopped.
 
     An `error` that a person can mend is one line, any other all of it. `answers`: what the call
-    said, by keys of the yaml; `command` and `others` as for `bundle_of`.
-
-    Raises:
-      InputError: the file cannot be written.
+    said, by keys of the yaml; the rest as for `bundle_of`.
     """
     sources = [Path(one) for one in files if isinstance(one, str | Path)]
-    named = [_named_files(source) for source in sources]
     clips = [clip for one in sources if (clip := _clip(one, answers or {})) is not None]
     objects = [item.name for item in clips[0].objects] if clips else []
-    hidden = impersonal(named, objects, others)
-    why = str(error) if isinstance(error, InputError) else _traced(error)
-    seen = [_seen(source) for source in sources]
+    hidden = impersonal([_named_files(source) for source in sources], objects, others)
     texts = {
         "command.txt": _command(command, hidden),
-        "error.txt": why,
-        "look.txt": "\n\n".join(seen),
-    }
-    declared = {
-        f"clip{n}_declared.yaml": content
-        for n, source in enumerate(sources, 1)
-        if (content := _declared_beside(source))
+        "error.txt": str(error) if isinstance(error, InputError) else _traced(error),
+        "look.txt": "\n\n".join(_seen(source) for source in sources),
     }
     measured = [one for clip in clips if (one := _measured(clip)) is not None]
     tracks = measured if len(measured) == len(sources) else []
-    return _written(Path(path), _Content(texts, {}, tracks, declared), hidden)
+    declared = [_declared_beside(source) for source in sources]
+    return _written(Path(path), hidden, texts, declared, tracks)
 
 
 def _traced(error: BaseException) -> str:
@@ -172,19 +145,25 @@ def _traced(error: BaseException) -> str:
     return "\n".join(line for line in lines if not line.startswith("    "))
 
 
-def _written(path: Path, content: _Content, hidden: Impersonal) -> Bundle:
+def _written(
+    path: Path,
+    hidden: Impersonal,
+    texts: Mapping[str, str],
+    declared: Sequence[Mapping[str, Any]],
+    tracks: Sequence[Measurement],
+    documents: Mapping[str, Any] = {},
+) -> Bundle:
+    """The bundle; all that it is given still has all names."""
     files: dict[str, bytes] = {}
-    for number, one in enumerate(content.tracks, 1):
+    for number, one in enumerate(tracks, 1):
         files |= _track_files(one, f"clip{number}", hidden)
-    for name, declared in content.declared.items():
-        files[name] = _yaml(hidden.value(declared))
-    for name, document in content.documents.items():
-        files[name] = (json.dumps(finite(hidden.value(finite(document))), indent=2) + "\n").encode()
-    for name, text in content.texts.items():
-        if text:
-            files[name] = (hidden.text(text) + "\n").encode()
-    found = {**versions(), "operating system": f"{platform.system()} {platform.machine()}"}
-    files["versions.json"] = (json.dumps(found, indent=2) + "\n").encode()
+    for number, content in enumerate(declared, 1):
+        if content:
+            files[f"clip{number}_declared.yaml"] = _yaml(hidden.value(content))
+    files |= {name: _json(hidden.value(finite(one))) for name, one in documents.items()}
+    files |= {name: f"{hidden.text(text)}\n".encode() for name, text in texts.items() if text}
+    machine = f"{platform.system()} {platform.machine()}"
+    files["versions.json"] = _json({**versions(), "operating system": machine})
     files = {"README.txt": _read_me(files), **files}
     try:
         with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
@@ -223,22 +202,21 @@ def _declared(clip: Clip) -> dict[str, Any]:
     content = clip.model_dump(
         mode="json", include=set(ClipFile.model_fields), exclude_defaults=True
     )
-    if clip.ramp_angle_deg is None or _is_fixed(clip):
+    if clip.ramp_angle_deg is None or SCENARIOS[clip.scenario].angle_deg is not None:
         content.pop("ramp_angle_deg", None)
     return content
-
-
-def _is_fixed(clip: Clip) -> bool:
-    return SCENARIOS[clip.scenario].angle_deg is not None
 
 
 def _declared_beside(source: Path) -> dict[str, Any]:
     """What the yaml of a file says; empty where there is none, or it is none."""
     path = yaml_of(source)
-    try:
+    with contextlib.suppress(InputError):
         return dict(read_mapping(path)) if path.is_file() else {}
-    except InputError:
-        return {}
+    return {}
+
+
+def _json(content: Any) -> bytes:
+    return (json.dumps(finite(content), indent=2) + "\n").encode()
 
 
 def _yaml(content: Mapping[str, Any]) -> bytes:
@@ -273,18 +251,16 @@ def _seen(source: Path) -> str:
 
 def _clip(source: Path, answers: Mapping[str, Any]) -> Clip | None:
     """The checked clip; None where that is what failed."""
-    try:
+    with contextlib.suppress(Exception):
         return load_clip(source, **{key: v for key, v in answers.items() if key != "points"})
-    except Exception:
-        return None
+    return None
 
 
 def _measured(clip: Clip) -> Measurement | None:
     """Where its objects were, where that is known; a film is not tracked anew for it."""
-    try:
+    with contextlib.suppress(Exception):
         return measure(clip) if clip.video is None or is_tracked(clip) else None
-    except Exception:
-        return None
+    return None
 
 
 def _read_me(names: Iterable[str]) -> bytes:
@@ -293,7 +269,5 @@ def _read_me(names: Iterable[str]) -> bytes:
         f"  {name:<22}{next((what for end, what in WHAT.items() if name.endswith(end)), '')}"
         for name in names
     ]
-    text = READ_ME.format(tracks=" ".join(tracks), files="\n".join(("", *listed)))
-    if not tracks:
-        text = "\n".join(line for line in text.splitlines() if "To do the same" not in line) + "\n"
-    return text.encode()
+    again = AGAIN.format(tracks=" ".join(tracks)) if tracks else ""
+    return READ_ME.format(again=again, files="\n".join(("", *listed))).encode()

@@ -1,12 +1,14 @@
 """`effects` and `scenarios`: what the package knows, one row each."""
 
 import inspect
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import pandas as pd
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
+from galileo_jax.runtime.lazy import pd
 
 
 def effects(effects_from: Sequence[str | Path] = ()) -> "pd.DataFrame":
@@ -23,16 +25,9 @@ def effects(effects_from: Sequence[str | Path] = ()) -> "pd.DataFrame":
       >>> "air_drag" in gx.effects().index
       True
     """
-    import pandas as pd
-
-    from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
-
     for path in effects_from:
         load_file(path)
-    rows = {
-        name: {"meaning": _first_sentence(type(make_effects([name])[0]))} for name in effect_names()
-    }
-    return pd.DataFrame.from_dict(rows, orient="index")
+    return _table({name: _meaning(type(make_effects([name])[0])) for name in effect_names()})
 
 
 def scenarios() -> "pd.DataFrame":
@@ -43,14 +38,15 @@ def scenarios() -> "pd.DataFrame":
       >>> "ramp" in gx.scenarios().index
       True
     """
-    import pandas as pd
-
-    from galileo_jax.clip.scenarios import SCENARIOS
-
-    rows = {name: {"meaning": one.meaning} for name, one in sorted(SCENARIOS.items())}
-    return pd.DataFrame.from_dict(rows, orient="index")
+    return _table({name: one.meaning for name, one in sorted(SCENARIOS.items())})
 
 
-def _first_sentence(kind: type) -> str:
-    text = inspect.getdoc(kind) or ""
+def _table(meanings: Mapping[str, str]) -> "pd.DataFrame":
+    return pd.DataFrame({"meaning": meanings})
+
+
+def _meaning(effect: type[Effect]) -> str:
+    """The first paragraph of its docstring, or of the file that declares it."""
+    of_file = getattr(sys.modules.get(effect.__module__), "__doc__", None)
+    text = inspect.cleandoc(effect.__doc__ or of_file or "")
     return " ".join(text.split("\n\n")[0].split())

@@ -55,23 +55,17 @@ ClipLike = Clip | str | Path | Mapping[str, Any]
 
 def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
     """A clip that is loaded already, or loads it."""
-    if isinstance(clip, Clip):
-        if pixels_per_metre is None:
-            return clip
-        if clip.rectangle is not None:
-            raise InputError(
-                f"{clip.path}: pixels_per_metre (given in the call): its rectangle already "
-                "gives the scale; "
-                "leave one of them out"
-            )
-        try:
-            return Clip.model_validate({**dict(clip), "pixels_per_metre": pixels_per_metre})
-        except ValidationError as error:
-            reason = error.errors()[0]["msg"]
-            raise InputError(
-                f"{clip.path}: pixels_per_metre (given in the call): {reason}"
-            ) from None
-    return load(clip, pixels_per_metre=pixels_per_metre)
+    if not isinstance(clip, Clip):
+        return load(clip, pixels_per_metre=pixels_per_metre)
+    if pixels_per_metre is None:
+        return clip
+    key = f"{clip.path}: pixels_per_metre (given in the call)"
+    if clip.rectangle is not None:
+        raise InputError(f"{key}: its rectangle already gives the scale; leave one of them out")
+    try:
+        return Clip.model_validate({**dict(clip), "pixels_per_metre": pixels_per_metre})
+    except ValidationError as error:
+        raise InputError(f"{key}: {error.errors()[0]['msg']}") from None
 
 
 def as_list(given: Any) -> list[Any]:

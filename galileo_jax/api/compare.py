@@ -4,31 +4,29 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from galileo_jax import __version__
-from galileo_jax.api.effect_choice import EffectsLike
+from galileo_jax.api.fit import EffectsLike
 from galileo_jax.api.fit import fit as fit_tracks
-from galileo_jax.api.fit_result import Fit
-from galileo_jax.api.run import load_run
+from galileo_jax.api.fit_result import Fit, load_run
 from galileo_jax.api.track import TrackLike
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
+from galileo_jax.report.comparison_page import write_comparison_page
+from galileo_jax.report.diagnosis_charts import comparison_chart
+from galileo_jax.report.draw import to_plotly
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.fit import best_fit
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
 
 FITTED = 0.6  # share of the work, for progress
 
@@ -73,23 +71,16 @@ class Comparison:
         `clip, object, axis, phase, rmse, noise` (m/s), `z` (standard deviations of what the model
         itself would give) and `whiteness` (correlation of neighbouring residuals).
         """
-        import pandas as pd
-
         return pd.DataFrame([asdict(place) for place in self.found.where])
 
     @in_float64
     def plot(self) -> "go.Figure":
         """Measured and fitted motion along the path, with the stretches where it fails shaded."""
-        from galileo_jax.report.diagnosis_charts import comparison_chart
-        from galileo_jax.report.draw import to_plotly
-
         return to_plotly(comparison_chart(self.paths))
 
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
-        from galileo_jax.report.comparison_page import write_comparison_page
-
         write_comparison_page(
             Path(path),
             ", ".join(self.fit.names),
@@ -121,7 +112,6 @@ class Comparison:
         return int(self.document["seed"])
 
     def __repr__(self) -> str:
-        """In one line."""
         said = "adequate" if self.is_adequate else "not adequate"
         return f"<Comparison {', '.join(self.fit.names)}: {said}, p = {self.p_value:.2g}>"
 
@@ -138,8 +128,8 @@ def compare(
     engine: str = "auto",
     seed: int | None = None,
     pixels_per_metre: float | None = None,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Comparison:
     """Tests a fitted model against its data, everywhere at once, with one p-value.
 
@@ -170,36 +160,32 @@ def compare(
     began = time.perf_counter()
     with progress.scope(on_progress, cancel):
         is_folder = isinstance(fit, str | Path) and Path(fit).is_dir()
-        if is_folder or isinstance(fit, Fit):
-            if effects or effects_from or pixels_per_metre:
-                where = fit if is_folder else ", ".join(fit.names)  # pyright: ignore
-                raise InputError(
-                    f"{where}: a run has its own effects and scale; give its clip instead to change"
-                )
-            if is_folder:
-                fit = load_run(fit, engine=engine)  # pyright: ignore
-            assert isinstance(fit, Fit)
-            chosen = int(fit.result["seed"]) if seed is None else seed
-            words = [fit.folder] if fit.folder else list(fit.result["clips"])
-            of_model = () if fit.folder else fit.effects
-            files = () if fit.folder else fit.result.get("effects_from", ())
-        else:
-            chosen = 0 if seed is None else seed
+        if (is_folder or isinstance(fit, Fit)) and (effects or effects_from or pixels_per_metre):
+            where = fit if is_folder else ", ".join(fit.names)  # pyright: ignore
+            raise InputError(
+                f"{where}: a run has its own effects and scale; give its clip instead to change"
+            )
+        if is_folder:
+            fit = load_run(fit, engine=engine)  # pyright: ignore
+        if not isinstance(fit, Fit):
             with progress.part(0.0, FITTED):
                 fit = fit_tracks(
                     fit,
                     effects=effects,
                     effects_from=effects_from,
                     engine=engine,
-                    seed=chosen,
+                    seed=seed or 0,
                     pixels_per_metre=pixels_per_metre,
                 )
-            words, of_model, files = list(fit.result["clips"]), fit.effects, effects_from
+        chosen = int(fit.result["seed"]) if seed is None else seed
+        model: dict[str, Any] = {}
+        if not fit.folder:
+            files = effects_from or fit.result.get("effects_from", ())
+            model = {"effects": ",".join(fit.effects), "effects_from": tuple(files)}
         command = command_line(
             "compare",
-            words,
-            effects=",".join(of_model),
-            effects_from=tuple(files),
+            [fit.folder] if fit.folder else list(fit.result["clips"]),
+            **model,
             engine=engine,
             seed=chosen or None,
             pixels_per_metre=pixels_per_metre,

@@ -5,20 +5,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from galileo_jax import __version__
-from galileo_jax.api.effect_choice import check_addition, resolved
-from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.fit_result import Fit, Found, make_fit, resolved
 from galileo_jax.api.motion import Motion, motions_at
-from galileo_jax.api.options import DiagnoseOptions, options_of
-from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
-from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
+from galileo_jax.diagnosis.diagnosis import Diagnosis as Verdicts
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.grammar import proposed_file
@@ -28,13 +25,15 @@ from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, wr
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
-from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
-from galileo_jax.model.effects.registry import effect_names, make_effects
+from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
+from galileo_jax.report.diagnosis_charts import diagnosis_chart
+from galileo_jax.report.diagnosis_page import write_diagnosis_page
+from galileo_jax.report.draw import to_plotly
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
@@ -42,14 +41,10 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.imperfect import with_imperfections
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
 
 DOCUMENT = "diagnosis.json"
 PLOTS = "plots"
@@ -84,7 +79,7 @@ class Diagnosis:
 
     measurements: tuple[Measurement, ...]
     problem: JointProblem
-    found: Found
+    found: Verdicts
     document: Mapping[str, Any]
     command: str
     effects_from: tuple[str, ...] = ()
@@ -107,8 +102,6 @@ class Diagnosis:
         and `log_prior`), `p_value`, `rmse` (m/s), `chi2_per_dof`, `score_test_z`,
         `confounded_with`.
         """
-        import pandas as pd
-
         columns = ["effect", "probability", "score", "log_evidence", "log_prior", "p_value"]
         columns += ["rmse", "chi2_per_dof", "score_test_z", "confounded_with"]
         return pd.DataFrame(self.document["candidates"], columns=columns)
@@ -119,8 +112,6 @@ class Diagnosis:
 
         `effects, rmse, noise` (m/s), `chi2_per_dof, p_value`, `k1, k1_sd, k2, k2_sd`.
         """
-        import pandas as pd
-
         rows = []
         for row in self.document["history"]:
             frictions = {name: row[name] for name in ("k1", "k2") if name in row}
@@ -138,8 +129,6 @@ class Diagnosis:
         `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula` (the most
         probable one that explains the data, or that none does).
         """
-        import pandas as pd
-
         record = self.document.get("missing_force")
         if record is None:
             return None
@@ -188,26 +177,18 @@ class Diagnosis:
         )
         part = part.with_sizes(whole.sizes)
         gradient = fit_among(chosen.fit, whole, part)
-        notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
-        notes["status"] = gradient.code.value
-        if self.effects_from:
-            notes["effects_from"] = resolved(self.effects_from)
         if is_unknown and gradient.sizes is None:
             rough = with_imperfections(part, gradient)
             part, gradient = rough.trials, rough.fit
         posterior = fit_posterior(part, gradient, seed)
-        if gradient.sizes is not None:
-            notes["imperfections"] = imperfections(part, gradient.sizes, posterior)
+        notes = {"status": gradient.code.value}
         return make_fit(
             self.measurements,
-            part,
-            posterior,
-            gradient.z,
-            gradient,
+            Found(part, posterior, gradient.z, notes, gradient),
             method="grad",
             seed=seed,
             timings=self.document["timings_s"],
-            notes=notes,
+            effects_from=self.effects_from,
         )
 
     def next_command(self, folder: str | Path = ".") -> str:
@@ -218,16 +199,11 @@ class Diagnosis:
     @in_float64
     def plot(self) -> "go.Figure":
         """The error over the rounds, and the candidates' probabilities."""
-        from galileo_jax.report.diagnosis_charts import diagnosis_chart
-        from galileo_jax.report.draw import to_plotly
-
         return to_plotly(diagnosis_chart(self.found))
 
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
-        from galileo_jax.report.diagnosis_page import write_diagnosis_page
-
         clips = [one.clip for one in self.measurements]
         write_diagnosis_page(
             Path(path),
@@ -278,7 +254,6 @@ class Diagnosis:
         return folder
 
     def __repr__(self) -> str:
-        """In one line."""
         names = ", ".join(one.name for one in self.measurements)
         return f"<Diagnosis {names}: {self.sentence}>"
 
@@ -298,8 +273,8 @@ def diagnose(
     engine: str = "auto",
     seed: int = 0,
     pixels_per_metre: float | None = None,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Diagnosis:
     """Asks which effect is missing, adds it, and shows how the error falls.
 
@@ -333,28 +308,32 @@ def diagnose(
       >>> found.verdict.status, found.verdict.effects
       ('named', ('air_drag',))
     """
-    options = options_of(
-        DiagnoseOptions, locals(), effects_from=tuple(str(path) for path in effects_from)
-    )
-    check_addition(add, options.effects_from)
+    files = tuple(map(str, effects_from))
+    for path in files:
+        load_file(path)
+    check_known("--add", "effect", add, ("auto", "none", *effect_names()))
+
+    def compile_for(clips: Sequence[Clip], likely: Sequence[Observation]) -> None:
+        GradientFitter(with_library(clips, likely, engine)).compile(with_races=True)
+
     with progress.scope(on_progress, cancel):
         with progress.part(0.0, TRACKED):
-            measured, track_s = as_measurements(
-                tracks, pixels_per_metre, lambda clips: _compile_beside(clips, engine)
-            )
+            measured, track_s = as_measurements(tracks, pixels_per_metre, compile_for)
         if scarce := [one.no_verdict for one in measured if one.no_verdict]:
             raise InputError(scarce[0])
         command = command_line(
             "diagnose",
             [one.clip.source for one in measured],
-            effects_from=options.effects_from,
+            effects_from=files,
             add=add,
             engine=engine,
             seed=seed or None,
             pixels_per_metre=pixels_per_metre,
         )
         with progress.part(TRACKED, 1.0):
-            return _diagnosed(measured, options, track_s, command)
+            return _diagnosed(
+                measured, command, engine, seed, add=add, effects_from=files, track_s=track_s
+            )
 
 
 def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnosis:
@@ -364,15 +343,7 @@ def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnos
     """
     sources = [one.clip.source for one in fit.measurements]
     command = command_line("diagnose", sources, engine=engine, seed=seed or None)
-    options = DiagnoseOptions(engine=engine, seed=seed)
-    return _diagnosed(fit.measurements, options, 0.0, command, fit)
-
-
-def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
-    def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        GradientFitter(with_library(some, seen, engine)).compile(with_races=True)
-
-    return precompile(clips, compile_for).join
+    return _diagnosed(fit.measurements, command, engine, seed, before=fit)
 
 
 def with_library(
@@ -383,11 +354,7 @@ def with_library(
 ) -> JointProblem:
     """The joint problem with all effects and nameless forms that have a place in the scene.
 
-    Args:
-      clips: of the same objects.
-      observations: of the clips.
-      engine: of the rollouts.
-      library: names of the effects; None: all that are registered.
+    `library`: names of the effects; None: all that are registered.
     """
 
     def problem_with(names: Sequence[str]) -> JointProblem:
@@ -405,17 +372,21 @@ def with_library(
 
 def _diagnosed(
     measured: Sequence[Measurement],
-    options: DiagnoseOptions,
-    track_s: float,
     command: str,
+    engine: str,
+    seed: int,
+    *,
+    add: str = "auto",
+    effects_from: tuple[str, ...] = (),
+    track_s: float = 0.0,
     before: Fit | None = None,
 ) -> Diagnosis:
     """The diagnosis of tracks; `before`: a fit of them without effects, if there is one."""
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
-    seed, files, began = options.seed, options.effects_from, time.perf_counter()
-    problem = with_library(clips, observations, options.engine)
-    if options.add not in ("auto", "none", *problem.all_effects):
-        raise InputError(f"--add: {options.add} has no place in {clips[0].path}")
+    began = time.perf_counter()
+    problem = with_library(clips, observations, engine)
+    if add not in ("auto", "none", *problem.all_effects):
+        raise InputError(f"--add: {add} has no place in {clips[0].path}")
 
     told = _Told(problem, clips, seed)
     base = None
@@ -424,7 +395,7 @@ def _diagnosed(
     found = run_loop(
         problem,
         seed=seed,
-        add=options.add,
+        add=add,
         base=base,
         on_stage=told.stage,
         on_round=told.round,
@@ -432,9 +403,23 @@ def _diagnosed(
     )
     with progress.part(max(told.share, ADVISED), 1.0):
         found = with_next(found, clips[0], problem, seed)
-    timings = {"track": round(track_s, 3), "diagnose": round(time.perf_counter() - began, 3)}
-    document = _document(measured, problem, found, options, timings)
-    made = Diagnosis(tuple(measured), problem, found, document, command, files)
+    document = {
+        "clips": [clip.source for clip in clips],
+        TRACKS: [digest(seen) for seen in observations],
+        "sentence": diagnosis_text.verdict(found),
+        **diagnosis_document(problem, found, seed),
+        **inferred(measured),
+        **({"effects_from": resolved(effects_from)} if effects_from else {}),
+        "left_out": [name for name in effect_names() if name not in problem.all_effects],
+        "engine": problem.problems[0].engine.name,
+        "timings_s": {
+            "track": round(track_s, 3),
+            "diagnose": round(time.perf_counter() - began, 3),
+        },
+        "version": __version__,
+        "seed": seed,
+    }
+    made = Diagnosis(tuple(measured), problem, found, document, command, effects_from)
     progress.report("diagnosed", 1.0, made)
     return made
 
@@ -474,27 +459,3 @@ def _motions_of(
     """Every clip's motion as a hypothesis has it."""
     trials, fit = hypothesis.of(problem), hypothesis.fit
     return motions_at(trials, clips, trials.theta(fit.z, fit.free))
-
-
-def _document(
-    measured: Sequence[Measurement],
-    problem: JointProblem,
-    found: Found,
-    options: DiagnoseOptions,
-    timings: Mapping[str, float],
-) -> dict[str, Any]:
-    """diagnosis.json; `timings` by stage, s."""
-    clips, files = [one.clip for one in measured], options.effects_from
-    return {
-        "clips": [clip.source for clip in clips],
-        TRACKS: [digest(one.observation) for one in measured],
-        "sentence": diagnosis_text.verdict(found),
-        **diagnosis_document(problem, found, options.seed),
-        **inferred(measured),
-        **({"effects_from": resolved(files)} if files else {}),
-        "left_out": [name for name in effect_names() if name not in problem.all_effects],
-        "engine": problem.problems[0].engine.name,
-        "timings_s": timings,
-        "version": __version__,
-        "seed": options.seed,
-    }

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.next_experiment import rehearsed
@@ -14,14 +14,12 @@ from galileo_jax.experiment.journal import Journal, law_row, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of, write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
 from galileo_jax.experiment.settings import Can
+from galileo_jax.report.experiment_page import write_discovery_page
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import writing_into
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, Cancelled, OnProgress
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DIAGNOSIS = "diagnosis"  # folder of the last one
 MEASURED, DIAGNOSED = 0.1, 0.8  # of the work of one experiment, for progress
@@ -65,26 +63,19 @@ class Discovery:
     @property
     def experiments(self) -> "pd.DataFrame":
         """One row per experiment: `number, settings, reason, outcome, line, clip`."""
-        import pandas as pd
-
         return pd.DataFrame(self.document["experiments"])
 
     @property
     def rounds(self) -> "pd.DataFrame":
         """One row per verdict: `clips, status, effects, form, law, sentence, hypotheses`."""
-        import pandas as pd
-
         return pd.DataFrame(self.document["rounds"])
 
     def report(self, path: str | Path) -> Path:
         """Writes the page: one HTML file, no network needed."""
-        from galileo_jax.report.experiment_page import write_discovery_page
-
         write_discovery_page(Path(path), self.document, self.sentence)
         return Path(path)
 
     def __repr__(self) -> str:
-        """In one line."""
         return f"<Discovery: {self.sentence}>"
 
 
@@ -97,8 +88,8 @@ def discover(
     timeout: float = 60.0,
     effects_from: Sequence[str | Path] = (),
     seed: int = 0,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Discovery:
     """Finds out what a lab's objects do: measures, diagnoses, chooses the next setting.
 
@@ -136,10 +127,10 @@ def discover(
         lab = program_of(lab, timeout)
     with ExitStack() as stack:
         stack.enter_context(progress.scope(on_progress, cancel))
-        folder = out
-        if folder is None:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="galileo."))
-        folder = Path(folder)
+        if out is None:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="galileo.")))
+        else:
+            folder = Path(out)
         with writing_into(folder):
             folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -153,7 +144,7 @@ def discover(
         found = loop.run()
         if found is None and journal.rounds and not (folder / DIAGNOSIS).is_dir():
             with progress.part(MOST_SHARE, 0.99):  # broken off before it was saved
-                found = loop.diagnosed_again()
+                found = loop.diagnosed()
         made = Discovery(journal.document, found, None if out is None else folder)
         if out is not None:
             progress.report("writing the pages", 0.99)
@@ -164,55 +155,48 @@ def discover(
         return made
 
 
+@dataclass
 class _Loop:
     """One discovery. What is done stands in the journal before the next thing is begun."""
 
-    def __init__(
-        self,
-        lab: Lab,
-        described: Described,
-        can: Can,
-        journal: Journal,
-        budget: int,
-        effects_from: tuple[str, ...],
-    ):
-        self._lab, self._described, self._can = lab, described, can
-        self._journal, self._budget, self._effects_from = journal, budget, effects_from
+    lab: Lab
+    described: Described
+    can: Can
+    journal: Journal
+    budget: int
+    effects_from: tuple[str, ...]
 
     def run(self) -> Diagnosis | None:
         """Goes on until the verdict is settled or the budget is spent."""
-        journal, found = self._journal, None
+        journal, found = self.journal, None
         while True:
-            experiments = journal.experiments
-            pending = experiments[-1] if experiments and not experiments[-1]["outcome"] else None
-            if pending is not None:
-                self._measure(pending)
-                continue
-            new = self._undiagnosed()
-            if new is not None:
-                found = self._diagnose(new) or found
-                continue
-            if why := self._end():
+            tracks, last = journal.tracks, journal.last
+            if journal.experiments and not journal.experiments[-1]["outcome"]:
+                self._measure(journal.experiments[-1])
+            elif tracks and (last is None or last["clips"] != [one["clip"] for one in tracks]):
+                found = self._diagnose(tracks[-1]) or found
+            elif why := self._end():
                 journal.ended = why
                 journal.write()
                 return found
-            settings, reason = self._choose(found)
-            self._journal.add({**settings, **journal.held}, reason)
+            else:
+                settings, reason = self._choose(found)
+                journal.add({**settings, **journal.held}, reason)
 
     def _share(self, part: float) -> float:
         """Of all the work, where so much of the last experiment's is done."""
-        before = max(len(self._journal.experiments) - 1, 0)
-        return min((before + part) / self._budget, MOST_SHARE)
+        before = max(len(self.journal.experiments) - 1, 0)
+        return min((before + part) / self.budget, MOST_SHARE)
 
     def _measure(self, row: dict[str, Any]) -> None:
-        journal = self._journal
+        journal = self.journal
         progress.report(f"experiment {row['number']}", self._share(0.0))
         path = journal.folder / "clips" / f"e{row['number']:03}.csv"
         try:
-            text = self._lab.measure(row["settings"])
+            text = self.lab.measure(row["settings"])
             others = {one["number"]: journal.folder / one["clip"] for one in journal.tracks}
-            write_clip(path, text, self._described.clip, row["settings"], others)
-        except Cancelled:
+            write_clip(path, text, self.described.clip, row["settings"], others)
+        except progress.Cancelled:
             raise
         except Exception as error:  # whatever a lab does must cost one experiment
             journal.close(row, line=_line(error))
@@ -220,20 +204,12 @@ class _Loop:
             journal.close(row, clip=str(path.relative_to(journal.folder)))
         progress.report("measured", self._share(MEASURED), {"experiment": row})
 
-    def _undiagnosed(self) -> dict[str, Any] | None:
-        """The last track, where no verdict has it yet."""
-        tracks, last = self._journal.tracks, self._journal.last
-        if not tracks or (last is not None and last["clips"] == [one["clip"] for one in tracks]):
-            return None
-        return tracks[-1]
-
     def _diagnose(self, new: dict[str, Any]) -> Diagnosis | None:
-        journal, share = self._journal, self._share(DIAGNOSED)
-        clips = [one["clip"] for one in journal.tracks]
+        journal, share = self.journal, self._share(DIAGNOSED)
         try:
             with progress.part(self._share(MEASURED), share):
-                found = self._diagnosed(clips)
-        except Cancelled:
+                found = self.diagnosed()
+        except progress.Cancelled:
             raise
         except Exception as error:  # whatever a lab's numbers bring about must cost one experiment
             journal.close(new, line=f"cannot be diagnosed: {_line(error)}")
@@ -241,7 +217,7 @@ class _Loop:
             return None
         verdict = found.verdict
         row = {
-            "clips": clips,
+            "clips": [one["clip"] for one in journal.tracks],
             "status": verdict.status,
             "effects": list(verdict.effects),
             "form": verdict.form,
@@ -254,56 +230,47 @@ class _Loop:
         progress.report("diagnosed", share, {"round": row})
         return found
 
-    def diagnosed_again(self) -> Diagnosis:
-        """The diagnosis of all tracks, of which the journal has the verdict only."""
-        return self._diagnosed([one["clip"] for one in self._journal.tracks])
-
-    def _diagnosed(self, clips: Sequence[str]) -> Diagnosis:
-        return diagnose(
-            [self._journal.folder / clip for clip in clips],
-            effects_from=self._effects_from,
-            seed=self._journal.seed,
-        )
+    def diagnosed(self) -> Diagnosis:
+        """The diagnosis of all tracks."""
+        clips = [self.journal.folder / one["clip"] for one in self.journal.tracks]
+        return diagnose(clips, effects_from=self.effects_from, seed=self.journal.seed)
 
     def _end(self) -> str | None:
         """Why it ends; None where it goes on."""
-        rounds = self._journal.rounds
+        rounds = self.journal.rounds
         if stands(rounds):
             return f"the verdict ({rounds[-1]['status']}) is the same in successive rounds"
-        if len(self._journal.experiments) >= self._budget:
-            return f"the budget of {self._budget} experiments is spent"
+        if len(self.journal.experiments) >= self.budget:
+            return f"the budget of {self.budget} experiments is spent"
         return None
 
     def _choose(self, found: Diagnosis | None) -> tuple[Mapping[str, Any], str]:
         """The next setting, and why."""
-        journal, names = self._journal, list(self._can)
-        tried = [{name: one["settings"][name] for name in names} for one in journal.experiments]
-        lost = [
-            row
-            for row, one in zip(tried, journal.experiments, strict=True)
-            if one["outcome"] == "lost"
-        ]
-        if not self._can:
+        journal = self.journal
+        tried = [{name: one["settings"][name] for name in self.can} for one in journal.experiments]
+        outcomes = [one["outcome"] for one in journal.experiments]
+        lost = [row for row, one in zip(tried, outcomes, strict=True) if one == "lost"]
+        if not self.can:
             return {}, "the lab has no setting that is known here: the same experiment again"
         if not tried:
-            return middle(self._can), "nothing is known yet: the middle of what the lab allows"
-        settings = candidates(self._can, lost, journal.seed)
+            return middle(self.can), "nothing is known yet: the middle of what the lab allows"
+        settings = candidates(self.can, lost, journal.seed)
         if not journal.tracks:
-            return farthest(self._can, settings, tried), (
+            return farthest(self.can, settings, tried), (
                 "no track yet: as different as possible from what failed"
             )
         if found is None:  # begun again after the budget was spent
-            found = self.diagnosed_again()
+            found = self.diagnosed()
         try:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
                 ahead = rehearsed(found, settings, journal.seed)
         except InputError as error:  # of scenes that nobody can set up here
             said = f"not simulated ({_line(error)}): as different as possible from those so far"
-            return farthest(self._can, settings, tried), said
+            return farthest(self.can, settings, tried), said
         best = ahead.expected[0]
         journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)
         if best.gain_nats < LITTLE:
-            return farthest(self._can, settings, tried), (
+            return farthest(self.can, settings, tried), (
                 f"no setting is expected to gain more than {best.gain_nats:.2f} nats: as different "
                 "as possible from those so far, to see whether the verdict holds"
             )

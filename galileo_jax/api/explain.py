@@ -1,5 +1,6 @@
 """`explain`: everything about a film or table in one call, as a lab report says it."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -33,7 +34,6 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.hypothesis import Hypothesis
 
 UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
@@ -133,7 +133,6 @@ class Explanation:
         return bundle_of(self, path)
 
     def __repr__(self) -> str:
-        """In one line."""
         return f"<Explanation {', '.join(self.fit.names)}: {self.paragraph}>"
 
     def _repr_html_(self) -> str:
@@ -155,8 +154,8 @@ def explain(
     point: Sequence[float] | Sequence[Sequence[float]] | None = None,
     engine: str = "auto",
     seed: int = 0,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Explanation:
     """Looks, tracks, fits, tests the model, and finds out what is missing where it fails.
 
@@ -191,20 +190,20 @@ def explain(
       >>> found.paragraph.split(" with")[0]
       'The block slid'
     """
-    answers = answers_of(
-        scenario=scenario,
-        ramp_angle_deg=ramp_angle,
-        pixels_per_metre=pixels_per_metre,
-        track_units=track_units,
-        fps=fps,
-        points=None
-        if point is None
-        else [(float(x), float(y)) for x, y in np.reshape(point, (-1, 2))],
-    )
+    places = [] if point is None else np.reshape(point, (-1, 2))
+    said = {
+        "scenario": scenario,
+        "ramp_angle_deg": ramp_angle,
+        "pixels_per_metre": pixels_per_metre,
+        "track_units": track_units,
+        "fps": fps,
+        "points": [(float(x), float(y)) for x, y in places] or None,
+    }
+    answers = {key: value for key, value in said.items() if value is not None}
     with progress.scope(on_progress, cancel):
         progress.report("looking", 0.0)
         with progress.part(0.0, UNDERSTOOD):
-            found_clips, _ = answered_clips(sources_of(clips), answers, lambda _, said: said)
+            found_clips, _ = answered_clips(sources_of(clips), answers)
         found = explained(found_clips, engine, seed)
         if out is not None:
             progress.report("writing the page", 0.97)
@@ -213,17 +212,8 @@ def explain(
         return found
 
 
-def answers_of(**said: Any) -> dict[str, Any]:
-    """What was said, by keys of the yaml, without what was not."""
-    return {key: value for key, value in said.items() if value is not None}
-
-
 def sources_of(clips: ClipLike | Sequence[ClipLike]) -> list[ClipLike]:
-    """The clips of a call; of a folder all in it, in the order of their names.
-
-    Raises:
-      InputError: there is none.
-    """
+    """The clips of a call; of a folder all in it, in the order of their names."""
     given = as_list(clips)
     if not given:
         raise InputError("no clip given; at least one expected")
@@ -254,9 +244,6 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
     """The checked clip, where its yaml leaves nothing open; else what is understood of the file.
 
     `answers`: what a person said, by keys of the yaml: it goes before what a yaml declares.
-
-    Raises:
-      InputError: the file or its yaml is wrong.
     """
     if isinstance(clip, Clip):
         return clip
@@ -275,49 +262,31 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
 def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
     """What a call that was stopped leaves for the next: yamls and tracks of films, in words."""
     found: list[str] = []
-    try:
-        files = [Path(one) for one in sources_of(clips) if isinstance(one, str | Path)]
-    except InputError:
-        return []
-    for path in files:
-        try:
-            clip = load_clip(path) if is_declared(path) else None
-        except InputError:
-            continue
-        if clip is not None:
-            found.append(str(clip.path))
-            found += [f"the track of {clip.video}"] if is_tracked(clip) else []
-    return found
-
-
-def checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
-    """The clip; what neither its yaml nor the answers say is taken from the file.
-
-    Raises:
-      InputError: the file is wrong, or something is missing that only a person can know.
-    """
-    (found,), _ = answered_clips([clip], answers, lambda _, said: said)
+    with contextlib.suppress(InputError):
+        for source in sources_of(clips):
+            with contextlib.suppress(InputError):
+                if isinstance(source, str | Path) and is_declared(source):
+                    clip = load_clip(source)
+                    found.append(str(clip.path))
+                    found += [f"the track of {clip.video}"] if is_tracked(clip) else []
     return found
 
 
 def answered_clips(
     clips: Sequence[ClipLike],
     said: Mapping[str, Any],
-    ask: Callable[[Understood, dict[str, Any]], dict[str, Any]],
+    ask: Callable[[Understood, dict[str, Any]], dict[str, Any]] = lambda _, said: said,
     look_at: Callable[[ClipLike, Mapping[str, Any]], Clip | Understood] = understood,
 ) -> tuple[list[Clip], list[tuple[Understood, dict[str, Any]]]]:
     """The checked clips, and those whose yaml leaves something open with what was answered.
 
-    What is answered of one trial holds of the next, but where its things are.
+    What is answered of one trial holds of the next, but where its things are. Nothing is written.
 
     Args:
       clips: the trials.
       said: of all of them, by keys of the yaml.
       ask: given what is understood of a clip, and the answers so far, returns all answers.
       look_at: `understood`, or it with a memory or a display of its progress.
-
-    Raises:
-      InputError: of any of them; nothing was written.
     """
     found: list[Clip] = []
     asked: list[tuple[Understood, dict[str, Any]]] = []
@@ -340,23 +309,19 @@ def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanatio
         first = fit_tracks(tracks, engine=engine, seed=seed)
     with progress.part(FITTED, COMPARED):
         check = compare(first)
-    command = command_line(
-        "explain",
-        [one.clip.source for one in first.measurements],
-        engine=engine,
-        seed=seed or None,
-    )
+    sources = [one.clip.source for one in first.measurements]
+    command = command_line("explain", sources, engine=engine, seed=seed or None)
+    found = Explanation(first, check, None, command)
     if check.found.no_verdict is not None:
-        return Explanation(first, check, None, command)
-    if check.is_adequate:
-        with progress.part(COMPARED, 0.95):
-            progress.report("what could not have been seen", 0.0)
-            return Explanation(first, check, None, command, _could_not_see(check, engine, seed))
-    progress.report("asking what is missing", COMPARED, Explanation(first, check, None, command))
+        return found
     with progress.part(COMPARED, 0.95):
-        found = diagnose_fitted(first, engine=engine, seed=seed)
+        if check.is_adequate:
+            progress.report("what could not have been seen", 0.0)
+            return replace(found, could_not_see=_could_not_see(check, engine, seed))
+        progress.report("asking what is missing", 0.0, found)
+        missing = diagnose_fitted(first, engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
-        return Explanation(found.best, check, found, command)
+        return replace(found, fit=missing.best, diagnosis=missing)
 
 
 def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[str, Any]]:

@@ -1,25 +1,33 @@
-"""`export`: tracks and fits, for other programs."""
+"""`export`: tracks and fits as csv, parquet, netCDF or figures, for other programs."""
 
+import shutil
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
 
 from galileo_jax.clip.checks import check_scale
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.files.tables import TABLE_FORMATS, write_table
+from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import measure
-from galileo_jax.results.export import (
-    FORMATS,
-    clip_folders,
-    export_run,
-    export_tracks,
-)
-from galileo_jax.results.run import load_run, read_result
-from galileo_jax.runtime.atomic_write import writing_into
+from galileo_jax.observation.observation import Observation
+from galileo_jax.report.draw import write_svgs
+from galileo_jax.report.fit_page import charts_of_run
+from galileo_jax.results.run import OBSERVATION, POSTERIOR, load_run, read_result
+from galileo_jax.runtime.atomic_write import replacing, writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.lazy import pd, xr
 from galileo_jax.runtime.precision import in_float64
 
-SVG = "svg"
+NETCDF, SVG = "netcdf", "svg"
+FORMATS = (*TABLE_FORMATS, NETCDF, SVG)
+MEASURED = ["x_m", "y_m", "sd_x_m", "sd_y_m", "correlation"]
+ACROSS = ["z_m", "sd_z_m"]  # of motion off the plane
 
 
 @dataclass(frozen=True)
@@ -59,33 +67,141 @@ def export(
       ['track.csv']
     """
     source = Path(source)
-    check_known("--to", "format", to, (*FORMATS, SVG))
+    check_known("--to", "format", to, FORMATS)
     if not source.exists():
         raise InputError(f"{source}: no such file or folder")
-    if to == SVG:
-        return Exported(tuple(_plots(source, Path(out or source / "export"))))
     if source.is_dir():
-        return Exported(tuple(export_run(source, Path(out or source / "export"), to, fitted)))
-    if fitted:
-        raise InputError(f"--fitted: of a folder written by `galileo fit`, not of {source}")
+        return Exported(tuple(_export_run(source, Path(out or source / "export"), to, fitted)))
+    if to == SVG or fitted:
+        option = f"--to {SVG}" if to == SVG else "--fitted"
+        raise InputError(f"{option}: of a folder written by `galileo fit`, not of {source}")
     clip = load_clip(source)
     check_scale(clip)
     measured = measure(clip)
-    folder = Path(out or f"{measured.name}_export")
-    paths = export_tracks({measured.name: measured.observation}, folder, to)
-    return Exported(tuple(paths), clip.warnings)
+    folder, tracks = Path(out or f"{measured.name}_export"), {measured.name: measured.observation}
+    if to == NETCDF:
+        return Exported((_write_netcdf(folder / f"{measured.name}.nc", tracks),), clip.warnings)
+    tables = {"track": _track_table(tracks, {})}
+    return Exported(tuple(_write_tables(tables, folder, to)), clip.warnings)
 
 
-def _plots(folder: Path, out: Path) -> list[Path]:
-    from galileo_jax.report.draw import write_svgs
-    from galileo_jax.report.fit_page import charts_of_run
+def _export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> Iterable[Path]:
+    """Writes the tracks, the parameters' summaries and the draws of a run, or its figures."""
+    result = read_result(folder)
+    clips = {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{OBSERVATION}"))}
+    if (folder / OBSERVATION).is_file():
+        clips = {Path(result["clips"][0]).stem: folder}
+    if to == SVG:
+        return _write_figures(clips, out)
+    tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in clips.items()}
+    fitted = {name: _fitted_m(one) for name, one in clips.items()} if with_fitted else {}
+    posterior = folder / POSTERIOR
+    if not posterior.is_file():
+        raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
+    if to == NETCDF:
+        return [_write_netcdf(out / f"{folder.resolve().name}.nc", tracks, fitted, posterior)]
+    tables = {
+        "track": _track_table(tracks, fitted),
+        "parameters": parameter_table(result),
+        "draws": _draw_table(posterior),
+    }
+    return _write_tables(tables, out, to)
 
-    if not folder.is_dir():
-        raise InputError(f"--to {SVG}: of a folder written by `galileo fit`, not of {folder}")
-    folders = clip_folders(folder, read_result(folder))
-    written = []
-    for name, one in folders.items():
-        run = load_run(one)
+
+def _write_figures(clips: Mapping[str, Path], out: Path) -> Iterable[Path]:
+    for name, folder in clips.items():
+        run = load_run(folder)
         with writing_into(out):
-            written += write_svgs(out / name if len(folders) > 1 else out, charts_of_run(run))
-    return written
+            yield from write_svgs(out / name if len(clips) > 1 else out, charts_of_run(run))
+
+
+def _write_tables(tables: Mapping[str, "pd.DataFrame"], out: Path, to: str) -> Iterable[Path]:
+    for name, table in tables.items():
+        path = out / f"{name}.{to}"
+        with writing_into(out):
+            write_table(path, table)
+        yield path
+
+
+def _write_netcdf(
+    path: Path,
+    tracks: Mapping[str, Observation],
+    fitted_m: Mapping[str, np.ndarray] = {},
+    posterior: Path | None = None,
+) -> Path:
+    """Writes ArviZ's `observed_data` of each clip, beside the groups of a posterior."""
+    with writing_into(path.parent), replacing(path) as temporary:
+        if posterior is not None:
+            shutil.copyfile(posterior, temporary)
+        for name, observation in tracks.items():
+            _dataset(observation, fitted_m.get(name)).to_netcdf(
+                temporary,
+                mode="w" if posterior is None else "a",
+                group="observed_data" if len(tracks) == 1 else f"observed_data/{name}",
+                engine="h5netcdf",
+            )
+    return path
+
+
+def _fitted_m(folder: Path) -> np.ndarray:
+    """Where the best fit has the points that were followed: `[object, 2, frame]`, m."""
+    run = load_run(folder)
+    centres = np.asarray(run.problem.simulate(run.best[: len(run.problem.model.names)]))
+    return centres + run.problem.observation.offset_m(centres)[..., None]
+
+
+def _track_table(
+    tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]
+) -> "pd.DataFrame":
+    """One row per clip, object and time; empty where the object was not visible."""
+    parts = []
+    for clip, observed in tracks.items():
+        for k, name in enumerate(observed.names):
+            covariance = observed.covariance_m2[k]
+            sd = np.sqrt(np.diagonal(covariance)).T
+            part = pd.DataFrame({"clip": clip, "object": name, "time_s": observed.times_s})
+            part["x_m"], part["y_m"], *z = observed.position_m[k]
+            part["sd_x_m"], part["sd_y_m"] = sd[:2]
+            part["correlation"] = covariance[0, 1] / (sd[0] * sd[1])
+            if z:
+                part["z_m"], part["sd_z_m"] = z[0], sd[2]
+            part.loc[~observed.mask[k], [*MEASURED, *(ACROSS if z else ())]] = np.nan
+            if clip in fitted_m:
+                for axis, values in zip("xyz", fitted_m[clip][k], strict=False):
+                    part[f"fitted_{axis}_m"] = values
+            parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def parameter_table(result: Mapping[str, Any]) -> "pd.DataFrame":
+    """One row per parameter, with the part of result.json in which it stands."""
+    rows = [
+        {"name": name, "kind": kind, **entry}
+        for kind in ("parameters", "derived", "nuisances")
+        for name, entry in result[kind].items()
+    ]
+    titles = ["name", "kind", "unit", "mean", "sd", "q025", "q975", "identified"]
+    return pd.DataFrame(rows, columns=titles)
+
+
+def _draw_table(posterior: Path) -> "pd.DataFrame":
+    """One row per chain and draw, one column per parameter."""
+    found = Posterior.from_netcdf(posterior)
+    chain, draw = np.indices(found.draws.shape[:2]).reshape(2, -1)
+    values = {name: found[name].reshape(-1) for name in found.names}
+    log_density = found.log_density.reshape(-1)
+    return pd.DataFrame({"chain": chain, "draw": draw, **values, "log_density": log_density})
+
+
+def _dataset(observed: Observation, fitted_m: np.ndarray | None) -> Any:
+    """ArviZ's `observed_data`: `position_m [object, axis, time]` and its covariance."""
+    place = ("object", "axis", "time_s")
+    data: dict[str, Any] = {
+        "position_m": (place, observed.position_m),
+        "covariance_m2": (("object", "axis", "other_axis", "time_s"), observed.covariance_m2),
+        "is_seen": (("object", "time_s"), observed.mask.astype("i1")),
+    }
+    if fitted_m is not None:
+        data["fitted_position_m"] = (place, fitted_m)
+    axes = {"axis": ["x", "y"], "other_axis": ["x", "y"]}
+    return xr.Dataset(data, {"object": list(observed.names), "time_s": observed.times_s, **axes})

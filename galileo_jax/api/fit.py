@@ -2,23 +2,20 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of, resolved
-from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.fit_result import Fit, Found, make_fit
 from galileo_jax.api.options import (
-    BLOCK_STEPS,
     OF_THESIS,
     FitOptions,
     check_choices,
     ignored_options,
     options_of,
 )
-from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -29,25 +26,29 @@ from galileo_jax.inference.fit_posterior import (
     two_solutions,
     uncertain_width,
 )
-from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
-from galileo_jax.inference.imperfections import imperfections
+from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.free_quantities import make_free_quantities
+from galileo_jax.model.effects.registry import effect_names, load_file, make_effects, register
+from galileo_jax.model.parameters import inverse
 from galileo_jax.observation.observation import Observation
+from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import World, Worlds, fit_worlds
 
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
+BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 THESIS_CHAINS = 16
 TRACKED, FITTED = 0.4, 0.6  # shares of the work, for progress
 OFF_THE_PLANE = "an object has a z_m, which motion in a plane ignores; see --motion free"
+
+EffectsLike = str | Sequence[str | type[Effect]]
 
 
 @in_float64
@@ -73,8 +74,8 @@ def fit(
     acceptance: Literal["coin", "metropolis"] = "coin",
     selection: Literal["best", "least_variance"] = "best",
     checkpoint: str | Path | None = None,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Fit:
     """Estimates masses, friction coefficients and the strengths of effects.
 
@@ -132,23 +133,39 @@ def fit(
         free=names_of(free),
     )
     _check(options)
+
+    def compile_for(clips: Sequence[Clip], likely: Sequence[Observation]) -> None:
+        GradientFitter(_problem(clips, likely, options)).compile()
+
     with progress.scope(on_progress, cancel):
         with progress.part(0.0, TRACKED):
             measured, track_s = as_measurements(
-                tracks, pixels_per_metre, lambda clips: _compile_beside(clips, options)
+                tracks, pixels_per_metre, None if method == "cnn" else compile_for
             )
         with progress.part(TRACKED, 1.0):
             return _fitted(measured, options, track_s, Path(checkpoint) if checkpoint else None)
 
 
+def names_of(effects: EffectsLike) -> tuple[str, ...]:
+    """The effects' names; "a,b" is two of them, and a class that nobody registered is."""
+    if isinstance(effects, str):
+        return tuple(name.strip() for name in effects.split(",") if name.strip())
+    known = effect_names()
+    for one in effects:
+        if not isinstance(one, str) and one.name not in known:
+            register(one)
+    return tuple(one if isinstance(one, str) else one.name for one in effects)
+
+
+def chosen_effects(names: Sequence[str], files: Sequence[str | Path]) -> tuple[Effect, ...]:
+    """The effects of these names, those that files register included."""
+    for path in files:
+        load_file(path)
+    return make_effects(list(names))
+
+
 def _check(options: FitOptions) -> None:
-    """What is wrong with a call whatever its clips are.
-
-    Raises:
-      InputError: an option that this method does not have, or a value that it does not know.
-    """
-    from galileo_jax.rollout.engine_names import ENGINES
-
+    """Raises `InputError` for what is wrong with a call whatever its clips are."""
     check_choices(options)
     if options.discrepancy == "rough" and not _has_imperfections(options):
         raise InputError(
@@ -156,7 +173,10 @@ def _check(options: FitOptions) -> None:
             f"--preset galileo, not of --method {options.method} and --motion {options.motion}"
         )
     check_known("--engine", "engine", options.engine, ENGINES)
-    _refuse_ignored(options)
+    ignored, why = ignored_options(options.method, options.preset)
+    for name in ignored:
+        if getattr(options, name) != getattr(FitOptions(), name):
+            raise InputError(f"--{name.replace('_', '-')}: {why}")
     if options.method == "mh":
         from galileo_jax.inference.samplers.sampler import SAMPLERS
 
@@ -178,23 +198,10 @@ def _check(options: FitOptions) -> None:
     make_free_quantities(options.free)
 
 
-def _refuse_ignored(options: FitOptions) -> None:
-    """Refuses options that differ from their default and would be ignored."""
-    ignored, why = ignored_options(options.method, options.preset)
-    plain = FitOptions()
-    for name in ignored:
-        if getattr(options, name) != getattr(plain, name):
-            raise InputError(f"--{name.replace('_', '-')}: {why}")
-
-
 def _problem(
     clips: Sequence[Clip], observations: Sequence[Observation], options: FitOptions
 ) -> JointProblem:
-    """The joint problem of the model that was asked for.
-
-    Raises:
-      InputError: an effect has no place in these clips.
-    """
+    """The joint problem of the model that was asked for."""
     effects = chosen_effects(options.effects, options.effects_from)
     problem = make_joint_problem(
         clips,
@@ -220,27 +227,6 @@ def _has_imperfections(options: FitOptions) -> bool:
     return options.discrepancy in ("auto", "rough") and options.method != "cnn" and is_plain
 
 
-def _compile_beside(clips: Sequence[Clip], options: FitOptions) -> Any:
-    """Compiles in a thread while clips are tracked; returns what waits for it."""
-
-    def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        GradientFitter(_problem(some, seen, options)).compile()
-
-    return precompile(clips, None if options.method == "cnn" else compile_for).join
-
-
-@dataclass(frozen=True)
-class _Found:
-    """What a method found; `notes` are for result.json."""
-
-    problem: JointProblem
-    posterior: Posterior
-    z_best: np.ndarray
-    notes: Mapping[str, Any]
-    gradient: GradientFit | None = None
-    exact: GradientFit | None = None
-
-
 def _fitted(
     measured: Sequence[Measurement], options: FitOptions, track_s: float, checkpoint: Path | None
 ) -> Fit:
@@ -249,25 +235,22 @@ def _fitted(
     clips = [one.clip for one in measured]
     problem = _problem(clips, [one.observation for one in measured], options)
     timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
-    engine = problem.problems[0].engine.name
 
-    def made(found: _Found, notes: Mapping[str, Any]) -> Fit:
+    def made(found: Found) -> Fit:
         return make_fit(
-            tuple(measured),
-            found.problem,
-            found.posterior,
-            found.z_best,
-            found.gradient,
-            exact=found.exact,
+            measured,
+            found,
             method=options.method,
             seed=options.seed,
             timings=timings,
-            notes={"engine": engine, **found.notes, **notes},
+            effects_from=options.effects_from,
         )
 
     began = time.perf_counter()
     if options.method == "cnn":
-        found = _by_network(problem, options)
+        from galileo_jax.neural.estimate import cnn_posterior
+
+        found = Found(problem, *cnn_posterior(problem, options.seed))
     elif options.preset == "thesis":
         found = _by_thesis(problem, options)
     else:
@@ -281,31 +264,28 @@ def _fitted(
             raise InputError(f"{clips[0].path}: {worlds.best.fit.code}")
         found = _of_worlds(worlds, options, notes)
         if options.method == "mh":
-            progress.report("fitted by gradient", FITTED, made(found, {}))
+            progress.report("fitted by gradient", FITTED, made(found))
             found = _by_chains(found, starts, measured, options, checkpoint)
     timings["fit"] = time.perf_counter() - began
-    result = made(found, _notes(options, clips, found))
+    result = made(replace(found, notes={**found.notes, **_notes(options, clips, found)}))
     progress.report("fitted", 1.0, result)
     return result
 
 
-def _notes(options: FitOptions, clips: Sequence[Clip], found: _Found) -> dict[str, Any]:
-    """What result.json says beside the numbers: doubts, imperfections, what was asked for."""
-    problem, posterior, gradient = found.problem, found.posterior, found.gradient
+def _notes(options: FitOptions, clips: Sequence[Clip], found: Found) -> dict[str, Any]:
+    """What result.json says beside the numbers: doubts, and what was asked for."""
     notes: dict[str, Any] = {"motion": options.motion}
     said: list[str | None] = []
-    if gradient is not None and options.method != "mh":
-        said = [two_solutions(problem, gradient, posterior.flat()), uncertain_width(posterior)]
+    if found.gradient is not None and options.method != "mh":
+        draws = found.posterior.flat()
+        said = [two_solutions(found.problem, found.gradient, draws)]
+        said.append(uncertain_width(found.posterior))
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         said.append(OFF_THE_PLANE)
     if told := [line for line in said if line is not None]:
         notes["warnings"] = told
     if options.free:
         notes["free"] = sorted(options.free)
-    if options.effects_from:
-        notes["effects_from"] = resolved(options.effects_from)
-    if gradient is not None and gradient.sizes is not None:
-        notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
     return notes | {"discrepancy_asked": options.discrepancy}
 
 
@@ -334,7 +314,7 @@ def _gradient(
     return Worlds(World(fitter.trials, exact), exact), None, {}
 
 
-def _of_worlds(worlds: Worlds, options: FitOptions, notes: Mapping[str, Any]) -> _Found:
+def _of_worlds(worlds: Worlds, options: FitOptions, notes: Mapping[str, Any]) -> Found:
     """The posterior round the best fit, of method "grad" with its other world mixed in."""
     problem, gradient = worlds.best.trials, worlds.best.fit
     make = laplace_posterior if options.method == "mh" else fit_posterior
@@ -343,23 +323,16 @@ def _of_worlds(worlds: Worlds, options: FitOptions, notes: Mapping[str, Any]) ->
         other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
         posterior = posterior.mixed_with(other, worlds.share)
     notes = {"status": gradient.code.value, **notes}
-    return _Found(problem, posterior, gradient.z, notes, gradient, worlds.exact)
-
-
-def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:
-    """Theirs, and the fit's that they began from where it leaves a misfit."""
-    if gradient.code is not Code.MISFIT:
-        return posterior.status.value
-    return f"{posterior.status.value}; at the start of the chains: {gradient.code.value}"
+    return Found(problem, posterior, gradient.z, notes, gradient, worlds.exact)
 
 
 def _by_chains(
-    found: _Found,
+    found: Found,
     starts: np.ndarray | None,
     measured: Sequence[Measurement],
     options: FitOptions,
     checkpoint: Path | None,
-) -> _Found:
+) -> Found:
     """Samples from the gradient fit on; resumes what an interruption left in the checkpoint."""
     from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
     from galileo_jax.inference.samplers.driver import Progress, Settings
@@ -388,9 +361,12 @@ def _by_chains(
         identity=checkpoint_identity(measured, found.problem, options),
         on_block=on_block,
     )
+    status = posterior.status.value
+    if found.gradient.code is Code.MISFIT:
+        status += f"; at the start of the chains: {found.gradient.code.value}"
     notes = {
         **found.notes,
-        "status": _status_of_chains(posterior, found.gradient),
+        "status": status,
         "sampler": options.sampler,
         "sampling": dict(posterior.stats),
     }
@@ -408,16 +384,8 @@ def checkpoint_identity(
     return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
 
 
-def _by_network(problem: JointProblem, options: FitOptions) -> _Found:
-    """The trained network's answer."""
-    from galileo_jax.neural.estimate import cnn_posterior
-
-    return _Found(problem, *cnn_posterior(problem, options.seed))
-
-
-def _by_thesis(problem: JointProblem, options: FitOptions) -> _Found:
+def _by_thesis(problem: JointProblem, options: FitOptions) -> Found:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
-    from galileo_jax.model.parameters import inverse
     from galileo_jax.thesis.sampler import thesis_posterior
 
     chosen = {name: getattr(options, name) for name in OF_THESIS}
@@ -428,4 +396,4 @@ def _by_thesis(problem: JointProblem, options: FitOptions) -> _Found:
     theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]
     z_best = inverse(problem.parameters, np.asarray(theta))
     notes = {"status": posterior.status.value, "preset": options.preset, **chosen, "best": best}
-    return _Found(problem, posterior, z_best, notes)
+    return Found(problem, posterior, z_best, notes)

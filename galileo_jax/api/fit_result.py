@@ -1,30 +1,45 @@
-"""`Fit`, the result of `fit`: the posterior, and tables, figures and files derived from it."""
+"""`Fit`: the posterior, and tables, figures and files of it; `load_run` reads it again."""
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from galileo_jax.api.export import parameter_table
 from galileo_jax.api.motion import Motion, motions_at, replaced
 from galileo_jax.api.track_doubts import taken_as_exact, with_other_angle, with_track_doubts
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.problem import with_shared_parameters
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
-from galileo_jax.results.run import BEST, CHECKPOINT, POSTERIOR, RESULT, Run, save_run
+from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.fit_charts import fit_chart
+from galileo_jax.report.fit_page import PAGE, write_report
+from galileo_jax.results import run as runs_on_disk
+from galileo_jax.results.run import (
+    BEST,
+    CHECKPOINT,
+    CLIP,
+    POSTERIOR,
+    RESULT,
+    Run,
+    read_result,
+    save_run,
+)
 from galileo_jax.results.stale_outputs import remove_single_clip_run, remove_stale_prediction
 from galileo_jax.runtime.atomic_write import check_folder, write_json
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
     from arviz import InferenceData
 
 
@@ -91,8 +106,6 @@ class Fit:
         `identified` is False where the clip does not determine the parameter: the interval is
         then the prior's.
         """
-        from galileo_jax.results.export import parameter_table
-
         columns = ["kind", "mean", "sd", "q025", "q975", "unit", "identified"]
         return (
             parameter_table(self.result)
@@ -123,8 +136,6 @@ class Fit:
         the stated noise (independent, standard normal if model and statement are right). NaN
         where an object was not seen.
         """
-        import pandas as pd
-
         parts = []
         for motion in self.motions():
             left = motion.measured_m - motion.predicted_m
@@ -181,7 +192,7 @@ class Fit:
             method=str(self.result["method"]),
             seed=int(self.result["seed"]),
             timings_s=dict(self.result["timings_s"]),
-            notes=_notes(self.result),
+            notes={key: v for key, v in self.result.items() if key not in OF_RESULT},
         )
         return Run(folder, one.clip, self.problem.problems[index], own, result)
 
@@ -196,8 +207,6 @@ class Fit:
           InputError: no such clip.
         """
         from galileo_jax.prediction.posterior_predictive import posterior_predictive
-        from galileo_jax.report.draw import to_plotly
-        from galileo_jax.report.fit_charts import fit_chart
 
         runs = {run.problem.name: run for run in self.runs(self.folder or Path("."))}
         if (clip := clip or self.names[0]) not in runs:
@@ -232,8 +241,6 @@ class Fit:
         Returns:
           the fit, with its `folder`.
         """
-        from galileo_jax.report.fit_page import PAGE, write_report
-
         folder = Path(folder)
         check_folder(folder)
         remove_stale_prediction(folder)
@@ -252,7 +259,6 @@ class Fit:
         return replace(self, folder=folder)
 
     def __repr__(self) -> str:
-        """In one line."""
         shown = [
             f"{name} = {entry['mean']:.4g} +- {entry['sd']:.2g}"
             for name, entry in {**self.parameters, **self.result["derived"]}.items()
@@ -272,8 +278,6 @@ def write_pages(
 
     `lead` and `beside`: as for `write_report`.
     """
-    from galileo_jax.report.fit_page import write_report
-
     names = [path.stem if len(runs) == 1 else f"{path.stem}_{run.problem.name}" for run in runs]
     return tuple(
         write_report(run, path.with_name(f"{name}{path.suffix}"), lead, beside)
@@ -281,28 +285,46 @@ def write_pages(
     )
 
 
+def resolved(files: Sequence[str | Path]) -> list[str]:
+    """The files by their whole paths, as results name them."""
+    return [str(Path(path).resolve()) for path in files]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a method found; `notes` is what else it has to say, for result.json.
+
+    The rest as in `Fit`.
+    """
+
+    problem: JointProblem
+    posterior: Posterior
+    z_best: np.ndarray
+    notes: Mapping[str, Any] = field(default_factory=dict)
+    gradient: GradientFit | None = None
+    exact: GradientFit | None = None
+
+
 def make_fit(
-    measurements: tuple[Measurement, ...],
-    problem: JointProblem,
-    posterior: Posterior,
-    z_best: np.ndarray,
-    gradient: GradientFit | None,
+    measurements: Sequence[Measurement],
+    found: Found,
     *,
-    exact: GradientFit | None = None,
     method: str,
     seed: int,
     timings: Mapping[str, float],
-    notes: Mapping[str, Any],
+    effects_from: Sequence[str] = (),
 ) -> Fit:
-    """A `Fit` with its result.json.
-
-    `gradient`: where it came from, if it is a gradient fit; `exact`: that in an exact world, if
-    there is one; `notes`: what else the method has to say.
-    """
+    """A `Fit` with its result.json; `effects_from`: files whose effects are in the model."""
+    problem, z_best, gradient = found.problem, found.z_best, found.gradient
+    stored = {**found.posterior.provenance, BEST: [float(value) for value in z_best]}
+    posterior = replace(found.posterior, provenance=stored)
+    notes = {"engine": problem.problems[0].engine.name, **found.notes}
+    if effects_from:
+        notes["effects_from"] = resolved(effects_from)
+    if gradient is not None and gradient.sizes is not None:
+        notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
     if doubts := [doubt for one in measurements for doubt in one.doubts]:
-        notes = {**notes, "warnings": [*doubts, *notes.get("warnings", [])]}
-    stored = {**posterior.provenance, BEST: [float(value) for value in z_best]}
-    posterior = replace(posterior, provenance=stored)
+        notes["warnings"] = [*doubts, *notes.get("warnings", [])]
     result = make_result(
         problem,
         posterior,
@@ -328,14 +350,53 @@ def make_fit(
         result["warnings"] = [*result.get("warnings", []), *others]
     if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = taken
-    return Fit(measurements, problem, posterior, result, z_best, gradient, exact)
+    return Fit(tuple(measurements), problem, posterior, result, z_best, gradient, found.exact)
 
 
-OF_RESULT = {
+OF_RESULT = {  # what `make_result` writes by itself
     *("clips", "method", "converged", "effects", "parameters", "nuisances", "derived", "error"),
     *("timings_s", "version", "seed"),
-}  # what `make_result` writes by itself
+}
 
 
-def _notes(result: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in result.items() if key not in OF_RESULT}
+@in_float64
+def load_run(folder: str | Path, *, engine: str = "auto") -> Fit:
+    """Loads what `Fit.save` or `galileo fit` left in a folder.
+
+    Args:
+      folder: of the run; of several clips the folder above theirs.
+      engine: that rolls out from now on.
+
+    Raises:
+      InputError: no such run, or a file of it is damaged; names the file.
+
+    Examples:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
+      >>> saved = gx.fit("slide.csv").save("runs/slide")
+      >>> gx.load_run("runs/slide").parameters["k1"] == saved.parameters["k1"]
+      True
+    """
+    folder = Path(folder)
+    folders = [folder]
+    is_joint = (folder / RESULT).is_file() and not (folder / CLIP).is_file()
+    if is_joint:
+        folders = sorted(path.parent for path in folder.glob(f"*/{CLIP}")) or [folder]
+    runs = [runs_on_disk.load_run(each, engine) for each in folders]
+    posterior, result = runs[0].posterior, runs[0].result
+    if is_joint:
+        posterior = Posterior.from_netcdf(folder / POSTERIOR)
+        result = read_result(folder)
+        order = {Path(source).stem: i for i, source in enumerate(result["clips"])}
+        runs.sort(key=lambda run: order.get(run.problem.name, len(order)))
+    named = [replace(run.problem, name=Path(run.result["clips"][0]).stem) for run in runs]
+    problem = JointProblem(with_shared_parameters(named))
+    measurements = []
+    for run in runs:
+        source, seen = run.result["clips"][0], run.problem.observation
+        # Known by the name of what was fitted, not by that of the run's own copy, clip.yaml.
+        named_so = {"source": source, "path": Path(source).with_suffix(".yaml")}
+        measurements.append(Measurement(run.clip.model_copy(update=named_so), seen, seen))
+    best = posterior.provenance.get(BEST)
+    z_best = None if best is None else np.array(best)
+    return Fit(tuple(measurements), problem, posterior, result, z_best, folder=folder)

@@ -14,12 +14,10 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.toss.fit import TossSolution, fit_poses
 from galileo_jax.inference.toss.predict import Ahead, predict_rest
 from galileo_jax.inference.toss.residuals import COMMON, UNITS
-from galileo_jax.observation.poses import Poses
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 
 NORMAL_95 = 1.959964
 DOCUMENT = "tosses.json"
@@ -53,7 +51,6 @@ class TossFit:
         return folder
 
     def __repr__(self) -> str:
-        """In one line."""
         told = (f"{name} {one['mean']:.4g}" for name, one in self.parameters.items())
         return f"<TossFit of {len(self.solution.names)} tosses: {', '.join(told)}>"
 
@@ -64,8 +61,8 @@ def fit_tosses(
     *,
     window: float = 0.1,
     ahead: bool = False,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> TossFit:
     """Fits tosses of one cube together: scenario `toss`, poses beside a yaml.
 
@@ -102,7 +99,10 @@ def fit_tosses(
                 f"{clip.path}: objects[0].size_m: {edge:g}, but {loaded[0].path}: {edges[0]:g}; "
                 "tosses of the same cube expected"
             )
-    tosses = [_poses(clip, edge) for clip, edge in zip(loaded, edges, strict=True)]
+    tosses = []
+    for clip in loaded:
+        assert clip.track is not None  # a toss
+        tosses.append(read_poses_csv(clip.track, clip.track_up, edges[0]))
     with progress.scope(on_progress, cancel):
         with progress.part(0.0, FITTED if ahead else 1.0):
             found = fit_poses(tosses, edges[0], loaded[0].gravity, window)
@@ -112,24 +112,17 @@ def fit_tosses(
 
 
 def _edge_m(clip: Clip) -> float:
-    key = f"{clip.path}: objects[0]"
     thing = clip.objects[0]
     if clip.scenario != "toss" or clip.track is None:
         raise InputError(
             f"{clip.path}: scenario: {clip.scenario}; toss, with a csv track, expected"
         )
+    key = f"{clip.path}: objects[0].size_m"
     if thing.shape != "box" or thing.size_m is None:
-        raise InputError(
-            f"{key}.size_m: a box of known size expected, [edge, edge, edge] in metres"
-        )
+        raise InputError(f"{key}: a box of known size expected, [edge, edge, edge] in metres")
     if max(thing.size_m) > (1 + CUBE_WITHIN) * min(thing.size_m):
-        raise InputError(f"{key}.size_m: {list(thing.size_m)}: three equal edges expected")
+        raise InputError(f"{key}: {list(thing.size_m)}: three equal edges expected")
     return float(np.mean(thing.size_m))
-
-
-def _poses(clip: Clip, edge_m: float) -> Poses:
-    assert clip.track is not None
-    return read_poses_csv(clip.track, clip.track_up, edge_m)
 
 
 def _document(

@@ -51,8 +51,7 @@ class Look:
           InputError: the picture cannot be written.
         """
         if self.seen is None or self.table is None:
-            from galileo_jax.api.marked_picture import write_marks
-            from galileo_jax.api.understand import understand
+            from galileo_jax.api.understand import understand, write_marks
 
             return write_marks(understand(self.path), path)
         from galileo_jax.report.draw import write_picture
@@ -91,30 +90,25 @@ def look(file: str | Path, *, fps: float | None = None) -> Look:
 def _lines(seen: Seen) -> list[str]:
     rows = [("column", "role", "unit", "last digit")]
     for one in seen.columns:
-        is_used = one.role not in PLACES or one.role in seen.axes
-        role = f"{one.role} of {one.name}" if one.role and one.name else one.role
-        role = role if role and is_used else "not used"
+        is_used = bool(one.role) and (one.role not in PLACES or one.role in seen.axes)
+        role = f"{one.role} of {one.name}" if one.name else one.role
         digit = f"{one.resolution:.1g}" if math.isfinite(one.resolution) else ""
-        rows.append((one.title[:40], role, one.unit or "", digit))
-    widths = [max(len(row[n]) for row in rows) for n in range(4)]
+        rows.append((one.title[:40], str(role) if is_used else "not used", one.unit or "", digit))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [f"{seen.path.name}: {seen.num_rows} rows, {len(seen.names)} object(s)"]
     if seen.columns:
-        lines += ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
-                  for row in rows]  # fmt: skip
+        padded = ([c.ljust(w) for c, w in zip(row, widths, strict=True)] for row in rows)
+        lines += ["  ".join(row).rstrip() for row in padded]
     clock = "frames" if seen.is_in_frames else f"s ({1 / seen.step:.4g} a second)"
     gaps = ", ".join(f"after row {row} ({size:.3g} steps)" for row, size in seen.gaps[:5])
     more = f" and {len(seen.gaps) - 5} more" if len(seen.gaps) > 5 else ""
     lines.append(f"time step: {seen.step:.4g} {clock}; gaps: {gaps + more or 'none'}")
-    unit = seen.unit or "(no unit)"
-    moved = (
-        ", ".join(
-            f"{size:.4g} {'rad' if axis == 'angle' else unit} along "
-            f"{'the way' if axis == 'line' else axis}"
-            for axis, size in zip(seen.axes, seen.moved, strict=True)
-            if axis != "angle"
-        )
-        or f"{math.degrees(seen.moved[0]):.3g} degrees"
+    moved = ", ".join(
+        f"{size:.4g} {seen.unit or '(no unit)'} along {'the way' if axis == 'line' else axis}"
+        for axis, size in zip(seen.axes, seen.moved, strict=True)
+        if axis != "angle"
     )
+    moved = moved or f"{math.degrees(seen.moved[0]):.3g} degrees"
     lines.append(f"moves: {seen.names[0]} by {moved}")
     lines.append(f"likely scenario: {seen.scenario} ({seen.why})")
     beside = seen.path.with_suffix(".yaml")

@@ -62,14 +62,10 @@ def motions_at(
     theta: np.ndarray,
     best: np.ndarray | None = None,
 ) -> tuple[Motion, ...]:
-    """The motion of every clip with given parameters.
+    """The motion of every clip with parameters `theta`, in their units, noise scales last.
 
-    Args:
-      trials: the clips' problems.
-      clips: as fitted.
-      theta: `[parameter]`, in the parameters' units, noise scales last.
-      best: those of the fit, which say how far the followed points are from the centres; None:
-        `theta`.
+    `best`: those of the fit, which say how far the followed points are from the centres; None:
+    `theta`.
     """
     best = theta if best is None else best
     return tuple(
@@ -81,11 +77,7 @@ def motions_at(
 def replaced(
     trials: JointProblem, theta: np.ndarray, values: Mapping[str, float] | None
 ) -> np.ndarray:
-    """Parameters of which some have other values.
-
-    Raises:
-      InputError: a name is no parameter of the model; lists those that are.
-    """
+    """Parameters of which some have other values; refuses a name that is none of them."""
     theta = np.array(theta, float)
     for name, value in (values or {}).items():
         if name not in trials.names:

@@ -5,11 +5,11 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from galileo_jax import __version__
 from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose, with_library
-from galileo_jax.api.run import load_run
+from galileo_jax.api.fit_result import load_run
 from galileo_jax.api.track import Track, tracks_of
 from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.choose import (
@@ -23,15 +23,13 @@ from galileo_jax.experiment.hypothesis_probabilities import FILE, Beliefs, belie
 from galileo_jax.experiment.settings import check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import effect_names, load_file
+from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.experiment_page import gains_chart, write_next_page
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
 
 Found = Diagnosis | str | Path
 COLUMNS = ("gain_nats", "named", "lead_nats", "hit")
@@ -70,21 +68,14 @@ class NextExperiment:
 
         The settings by their names, `gain_nats`, `named` and `hit` (probabilities), `lead_nats`.
         """
-        import pandas as pd
-
         return pd.DataFrame(self.document["settings"])
 
     def plot(self) -> "go.Figure":
         """The gain against every setting."""
-        from galileo_jax.report.draw import to_plotly
-        from galileo_jax.report.experiment_page import gains_chart
-
         return to_plotly(gains_chart(self.document))
 
     def report(self, path: str | Path) -> Path:
         """Writes the page: one HTML file, no network needed."""
-        from galileo_jax.report.experiment_page import write_next_page
-
         write_next_page(Path(path), self.document)
         return Path(path)
 
@@ -96,7 +87,6 @@ class NextExperiment:
         return folder
 
     def __repr__(self) -> str:
-        """In one line."""
         return f"<NextExperiment: {self.sentence}>"
 
     def _repr_html_(self) -> str:
@@ -112,8 +102,8 @@ def next_experiment(
     can: str | Mapping[str, Any] | None = None,
     about: str | None = None,
     seed: int = 0,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> NextExperiment:
     """Says for every setting that a lab allows how much an experiment there is expected to tell.
 
@@ -181,15 +171,14 @@ def make_next(
 ) -> NextExperiment:
     """The result, the most telling setting first."""
     ordered = best_first(rows)
-    shares = beliefs.probability
-    hypotheses = {one.name: float(p) for one, p in zip(beliefs.of, shares, strict=True)}
+    shares = zip(beliefs.of, beliefs.probability, strict=True)
+    hypotheses = {one.name: float(p) for one, p in shares}
+    settings = [{**one.setting, **{key: getattr(one, key) for key in COLUMNS}} for one in ordered]
     document = {
         "about": about,
         "hypotheses": hypotheses,
         "sentence": sentence_of(ordered[0], about),
-        "settings": [
-            {**one.setting, **{key: getattr(one, key) for key in COLUMNS}} for one in ordered
-        ],
+        "settings": settings,
     }
     return NextExperiment(ordered, about, hypotheses, document)
 
@@ -207,24 +196,19 @@ def _loaded(
     given = [found] if isinstance(found, str | Path | Diagnosis) else list(found)
     if not given:
         raise InputError("no run given; at least one expected")
-    if len(given) == 1 and not isinstance(given[0], Diagnosis):
-        folder = _diagnosis_folder(Path(given[0]))
-        if folder is not None:
-            return _read(folder)
-    if len(given) == 1 and isinstance(given[0], Diagnosis):
-        one = given[0]
-    else:
+    one = given[0]
+    if len(given) > 1 or not (isinstance(one, Diagnosis) or _diagnosis_folder(one)):
         with progress.part(0.0, DIAGNOSED):
             one = diagnose([clip for run in given for clip in _tracks(run)], add="none")
+    if not isinstance(one, Diagnosis):
+        return _read(_diagnosis_folder(one) or Path(one))
     sources = [str(source) for source in one.document["clips"]]
     return one.measurements[0].clip, one.problem, beliefs_of(one.found), sources
 
 
-def _diagnosis_folder(folder: Path) -> Path | None:
-    for place in (folder, folder / "diagnosis"):
-        if (place / DOCUMENT).is_file():
-            return place
-    return None
+def _diagnosis_folder(folder: str | Path) -> Path | None:
+    places = (Path(folder), Path(folder) / "diagnosis")
+    return next((place for place in places if (place / DOCUMENT).is_file()), None)
 
 
 def _read(folder: Path) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
@@ -236,16 +220,14 @@ def _read(folder: Path) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
     for path in files:
         load_file(path)
     library = effect_names()  # the last model may have a law, which the hypotheses do not know
-    fit = load_run(folder / "model")
-    clips = [one.clip for one in fit.measurements]
-    engine = str(document.get("engine", "auto"))
-    trials = with_library(clips, [one.observation for one in fit.measurements], engine, library)
+    measured = load_run(folder / "model").measurements
+    clips, seen = [one.clip for one in measured], [one.observation for one in measured]
+    trials = with_library(clips, seen, str(document.get("engine", "auto")), library)
     return clips[0], trials, read_beliefs(folder / FILE, trials.names), sources
 
 
 def _tracks(run: Found) -> list[Track]:
     if isinstance(run, Diagnosis):
         return tracks_of(run.measurements)
-    folder = Path(run)
-    place = _diagnosis_folder(folder)
-    return tracks_of(load_run(place / "model" if place else folder).measurements)
+    place = _diagnosis_folder(run)
+    return tracks_of(load_run(place / "model" if place else run).measurements)

@@ -6,8 +6,6 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from galileo_jax.runtime.known_names import check_known
 
-BLOCK_STEPS = 25  # of every chain, between two looks at convergence
-MAX_STEPS = 4000
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
@@ -47,23 +45,13 @@ class FitOptions:
     noise: Literal["camera", "bodies", "tracker"] | None = None
     seed: int = 0
     sampler: str = "mixture"
-    max_steps: int = MAX_STEPS
+    max_steps: int = 4000
     chains: int | None = None
     init: Literal["grad", "cnn"] = "grad"
     preset: Literal["galileo", "thesis"] = "galileo"
     similarity: str = "thesis_gaussian"
     acceptance: Literal["coin", "metropolis"] = "coin"
     selection: Literal["best", "least_variance"] = "best"
-
-
-@dataclass(frozen=True)
-class DiagnoseOptions:
-    """What `diagnose` was asked for; the arguments of the same names."""
-
-    add: str = "auto"
-    effects_from: tuple[str, ...] = ()
-    engine: str = "auto"
-    seed: int = 0
 
 
 def ignored_options(method: str, preset: str) -> tuple[tuple[str, ...], str]:

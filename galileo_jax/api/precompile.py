@@ -7,7 +7,7 @@ lost.
 
 import contextlib
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 
 import jax
@@ -21,32 +21,29 @@ from galileo_jax.observation.observation import Observation
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
 NEEDED_LATER = ("galileo_jax.report.fit_page", "h5netcdf")
 
-Compile = Callable[[Sequence[Clip], Sequence[Observation]], None]
+Compile = Callable[[Sequence[Clip], Sequence[Observation]], object]
 
 
-def precompile(clips: Sequence[Clip], compile_for: Compile | None) -> threading.Thread:
-    """Starts to import and to compile in a thread, to be joined before anything is fitted.
+@contextlib.contextmanager
+def precompiling(clips: Sequence[Clip], compile_for: Compile | None) -> Iterator[None]:
+    """Imports and compiles in a thread, which is waited for at the end.
 
-    `compile_for` compiles what will fit clips and observations of these shapes; None: nothing
-    is compiled.
+    `compile_for` compiles what will fit clips and observations of these shapes; None: nothing is.
     """
 
     def work() -> None:
         # The real calls report what is wrong.
         with contextlib.suppress(Exception), jax.enable_x64(True):
-            if compile_for is not None:
-                _compile(clips, compile_for)
+            has_shapes = all(SCENARIOS[clip.scenario].has_table for clip in clips)
+            if compile_for is not None and has_shapes:
+                compile_for(clips, [_likely(clip) for clip in clips])
             for name in NEEDED_LATER:
                 import_module(name)
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
-    return thread
-
-
-def _compile(clips: Sequence[Clip], compile_for: Compile) -> None:
-    if all(SCENARIOS[clip.scenario].has_table for clip in clips):
-        compile_for(clips, [_likely(clip) for clip in clips])
+    yield
+    thread.join()
 
 
 def _likely(clip: Clip) -> Observation:
@@ -54,10 +51,9 @@ def _likely(clip: Clip) -> Observation:
     if clip.track is not None:
         return read_track(clip.path, clip.track, clip, clip.fps).observation
     count, frames = len(clip.objects), clip.frame_count
+    number = np.arange(count)
     position = np.zeros((count, 2, frames))
-    position[:, 0] = (START_M + APART_M * np.arange(count) + APART_M * (np.arange(count) > 0))[
-        :, None
-    ]
+    position[:, 0] = (START_M + APART_M * (number + (number > 0)))[:, None]
     return Observation(
         names=tuple(item.name for item in clip.objects),
         times_s=np.arange(frames) / clip.fps,

@@ -3,23 +3,21 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from galileo_jax.api.fit_result import Fit
-from galileo_jax.api.run import load_run
+from galileo_jax.api.fit_result import Fit, load_run
 from galileo_jax.prediction.extrapolate import Motions, answers, extrapolate
+from galileo_jax.report.draw import to_plotly, to_svg
+from galileo_jax.report.prediction import prediction_chart, prediction_lines, write_prediction
+from galileo_jax.report.side_view import write_first_and_last
 from galileo_jax.results.run import Run
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text, writing_into
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
 
 NUM_DRAWS = 200
 MOST_DRAWS = 10_000
@@ -53,8 +51,6 @@ class Prediction:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The answers in words."""
-        from galileo_jax.report.prediction import prediction_lines
-
         return tuple(prediction_lines(self.run, self.document))
 
     def to_dataframe(self) -> "pd.DataFrame":
@@ -62,8 +58,6 @@ class Prediction:
 
         `object, time_s, x_m, x_q025_m, x_q975_m, y_m, y_q025_m, y_q975_m, is_beyond_clip`.
         """
-        import pandas as pd
-
         times = self.motions.times_s
         low, middle, high = np.quantile(self.motions.position_m, [0.025, 0.5, 0.975], axis=0)
         parts = []
@@ -79,9 +73,6 @@ class Prediction:
     @in_float64
     def plot(self) -> "go.Figure":
         """Places over time with 95 % bands, measured points, and where the clip ends."""
-        from galileo_jax.report.draw import to_plotly
-        from galileo_jax.report.prediction import prediction_chart
-
         return to_plotly(prediction_chart(self.run, self.motions))
 
     @in_float64
@@ -91,10 +82,6 @@ class Prediction:
         Raises:
           InputError: the folder cannot be written.
         """
-        from galileo_jax.report.draw import to_svg
-        from galileo_jax.report.prediction import prediction_chart, write_prediction
-        from galileo_jax.report.side_view import write_first_and_last
-
         out = Path(folder)
         chart = prediction_chart(self.run, self.motions)
         picture = out / "first_and_last.png"
@@ -106,7 +93,6 @@ class Prediction:
         return out / "prediction.json", out / "prediction.svg", picture, page
 
     def __repr__(self) -> str:
-        """In one line."""
         return f"<Prediction {self.run.problem.name}: {' '.join(self.sentences)}>"
 
     def _repr_html_(self) -> str:
@@ -122,8 +108,8 @@ def predict(
     seconds: float,
     draws: int = NUM_DRAWS,
     seed: int = 0,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Prediction:
     """Continues a fitted scene beyond its clip, by rollouts of the posterior's draws.
 

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.tracking.detect import CameraMovesError, Mover, find_movers
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.video import decode
@@ -60,8 +58,8 @@ class Proposal:
 def propose(
     video: str | Path,
     *,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Proposal:
     """Looks for the objects that move in a video, for the ramp and its foot.
 
@@ -88,11 +86,8 @@ def propose(
         def advance() -> None:
             progress.report("looking for what moves", DETECTED * next(done) / info.frame_count)
 
-        def open_frames() -> Iterator[np.ndarray]:
-            return decode.frames(path)
-
         try:
-            movers = find_movers(open_frames, SPAN_PX, advance=advance)
+            movers = find_movers(lambda: decode.frames(path), SPAN_PX, advance=advance)
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None
         movers = [mover for mover in movers if not mover.first_frame]
@@ -121,16 +116,12 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
         standing = {**sizes, names[0]: _size(movers[0], turned)}
         found = _with_height(found, sizes[names[0]][1], standing[names[0]][1])
         ramp, foot = _line(found, standing[names[0]])
-        if len(seen) == 1 and foot is not None and _is_at_edge(found, foot):
-            continue  # it is stopped at the picture's edge rather than going on along a table
-        return Proposal(scenario, fps, seen, standing, direction, ramp, foot)
+        assert found.frame_size_px is not None  # of a video
+        edge = EDGE_SHARE * found.frame_size_px[0]
+        if len(seen) > 1 or foot is None or edge < foot[0] < found.frame_size_px[0] - edge:
+            return Proposal(scenario, fps, seen, standing, direction, ramp, foot)
+        # It is stopped at the picture's edge rather than going on along a table.
     return Proposal("ramp", fps, objects, sizes, direction, doubts=(doubts[0],))
-
-
-def _is_at_edge(clip: Clip, foot: Point) -> bool:
-    assert clip.frame_size_px is not None  # of a video
-    width = clip.frame_size_px[0]
-    return not EDGE_SHARE * width < foot[0] < (1 - EDGE_SHARE) * width
 
 
 def _content(

@@ -11,6 +11,7 @@ from galileo_jax.api.questions import check_answered, questions
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
+from galileo_jax.clip.scenarios.scenario import Scenario
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.runtime.atomic_write import write_text
@@ -20,14 +21,10 @@ FOOT_SD_PX = 3.0  # of a foot that was found, not marked
 
 
 def clip_of(known: Understood, answers: Answers, source: str | None = None) -> Clip:
-    """The checked clip.
+    """The checked clip; what a person said goes before what the yaml declares.
 
-    What a person said goes before what the yaml declares. `source`: what the clip is called in
-    results; None: its file.
-
-    Raises:
-      InputError: something that only a person can know is missing (one line names all of it), or
-        what was said is wrong.
+    `source`: what it is called in results; None: its file. Raises `InputError`, one line with all
+    that only a person can know and is missing, or with what was said and is wrong.
     """
     _check_slides(known, answers)
     check_answered(known, answers)
@@ -47,11 +44,13 @@ def _check_slides(known: Understood, answers: Answers) -> None:
     likely = known.likely(answers)
     if likely is None or likely.swings < SWINGS:
         return
-    what = "its path" if not known.is_film else "what moves"
+    what, which = "its path", ""
+    if known.is_film:
+        what, which = "what moves", ", or which thing is meant (--point X Y)"
     raise InputError(
         f"{known.source}: scenario: {scenario.name}, but {what} {likely.why}, over more than half "
         f"of its way: nothing slides so; cut one slide out, or say what it is (such as --scenario "
-        f"{likely.scenario})" + (", or which thing is meant (--point X Y)" if known.is_film else "")
+        f"{likely.scenario}){which}"
     )
 
 
@@ -61,27 +60,21 @@ def yaml_of(known: Understood, answers: Answers) -> str:
     if scenario is None:
         raise InputError(f"{known.source}: scenario: missing")
     if known.is_film:
-        return yaml_text(_of_film(known, answers))
+        return yaml_text(_of_film(known, scenario, answers))
     table = known.look.table
     assert table is not None  # of a table
-    first = table.motion(1)
-    text = proposed_yaml(known.source, first, scenario.name, None, len(table.starts))
-    said: dict[str, Any] = {
-        key: value for key, value in answers.items() if key not in ("points", "scenario")
-    }
+    text = proposed_yaml(known.source, table.motion(1), scenario.name, None, len(table.starts))
+    said = {key: value for key, value in answers.items() if key not in ("points", "scenario")}
     if needs_angle(scenario):
         said.setdefault("ramp_angle_deg", None)
-    if (unit := _sure_unit(known, answers)) is not None:
-        said.setdefault("track_units", unit)
+    for one in questions(known, answers):
+        if one.key == "track_units" and not one.is_open:  # its motion says it
+            said["track_units"] = one.default
     return _filled(text, said)
 
 
 def write_yaml(known: Understood, answers: Answers) -> Path | None:
-    """Writes the yaml beside the file; None where there is one, which stays as it is.
-
-    Raises:
-      InputError: the folder cannot be written to.
-    """
+    """Writes the yaml beside the file; None where there is one, which stays as it is."""
     if known.declared or known.yaml_path.exists():
         return None
     try:
@@ -94,26 +87,18 @@ def write_yaml(known: Understood, answers: Answers) -> Path | None:
 def _completed(known: Understood, answers: Answers) -> dict[str, Any]:
     """What an incomplete yaml declares, and what it lacks."""
     content = dict(known.declared)
-    made = yaml.safe_load(yaml_of(known, {**_plain(known.declared), **answers}))
+    plain = {key: content[key] for key in ("scenario", "fps") if key in content}
+    made = yaml.safe_load(yaml_of(known, {**plain, **answers}))
     kind, other = ("video", "track") if known.is_film else ("track", "video")
     content.pop(other, None)
     content[kind] = known.source.name
     wanted = {"scenario", "objects", "track_units", "ramp_angle_deg", "pixels_per_metre"}
     wanted |= {"fps", "pixels_per_metre_sd"} & {*answers, *(["fps"] if known.is_film else [])}
-    for key in wanted & set(made):
-        content.setdefault(key, made[key])
-    return content
+    return {key: made[key] for key in wanted & set(made)} | content
 
 
-def _plain(declared: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: declared[key] for key in ("scenario", "fps") if key in declared}
-
-
-def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
-
-    scenario = known.scenario(answers)
-    assert scenario is not None  # else a question is open
-    points = known.points(answers)
+def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[str, Any]:
+    points, shape = known.points(answers), usual_shape(scenario.name)
     fps = answers.get("fps") or round(known.look.fps or USUAL_FPS, 4)
     content: dict[str, Any] = {"video": known.source.name, "scenario": scenario.name, "fps": fps}
     if needs_angle(scenario):
@@ -125,7 +110,6 @@ def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
         content["pixels_per_metre_sd"] = answers["pixels_per_metre_sd"]
     if scenario.has_table and known.foot is not None:
         content |= {"origin_px": list(known.foot), "origin_sd_px": FOOT_SD_PX}
-    shape = usual_shape(scenario.name)
     content["objects"] = [
         {"name": f"object{n}", "shape": shape, "point_px": [float(x), float(y)]}
         for n, (x, y) in enumerate(points, 1)
@@ -133,14 +117,6 @@ def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
     if scenario.has_table:  # nobody has said when object 1 is let go: its motion does
         content["objects"][0]["first_frame"] = None
     return {key: content[key] for key in ClipFile.model_fields if key in content}
-
-
-def _sure_unit(known: Understood, answers: Answers) -> str | None:
-    """The unit of a table that does not say it, where its motion does."""
-    for one in questions(known, answers):
-        if one.key == "track_units" and not one.is_open:
-            return one.default
-    return None
 
 
 def _filled(text: str, said: Mapping[str, Any]) -> str:

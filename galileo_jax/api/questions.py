@@ -1,5 +1,6 @@
 """What only a person can know of a clip, as questions: what is asked, why, and what is likely."""
 
+import contextlib
 import math
 import re
 import shlex
@@ -48,14 +49,14 @@ class Question:
 
 def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
     """What is still to be asked, in the order in which it is; changes with what is answered."""
-    asked = [
+    asked = (
         _points(known),
         _scenario(known, answers),
         _fps(known),
         _units(known, answers),
         _angle(known, answers),
         _scale(known, answers),
-    ]
+    )
     told = {*answers, *known.declared}
     return tuple(one for one in asked if one is not None and one.key not in told)
 
@@ -94,30 +95,27 @@ def check_answered(known: Understood, answers: Answers) -> None:
     missing = [one for one in questions(known, answers) if one.is_open]
     if not missing:
         return
+    options = " ".join(one.option for one in missing)
+    call = f"galileo {shlex.quote(str(known.source))} {options}"
     if known.is_film and known.unseen and missing[0].key == "points":
-        options = " ".join(one.option for one in missing)
         raise InputError(
             f"{known.source}: {known.unseen}; film with a camera that rests, from before the "
             "motion to its end, or say where in the first picture the thing is, and what else "
-            f"does not show: galileo {shlex.quote(str(known.source))} {options}"
+            f"does not show: {call}"
         )
     keys = ", ".join(f"{one.key} ({one.why})" for one in missing)
-    options = " ".join(one.option for one in missing)
     name = known.yaml_path.name
     unsaid = f"{name} does not say" if known.declared else f"there is no {name} beside it that says"
     raise InputError(
         f"{known.source}: {unsaid} what the file does not show: {keys}; write it there, or say it "
-        f"in the call, such as: galileo {shlex.quote(str(known.source))} {options}"
+        f"in the call, such as: {call}"
     )
 
 
 def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
-    """An answer as a person types it, by keys of the yaml.
+    """An answer as a person types it, by keys of the yaml; nothing typed: the default.
 
-    Empty `text`: the default.
-
-    Raises:
-      InputError: it is none; says what would be right.
+    Raises `InputError` where it is none, and says what would be right.
     """
     text = text.strip() or question.default or ""
     if not text:
@@ -134,24 +132,23 @@ def parsed(question: Question, text: str, known: Understood, answers: Answers) -
 
 
 def _points(known: Understood) -> Question | None:
-    if not known.is_film or known.has_objects:
+    things = known.things
+    if not known.is_film or known.has_objects or len(things) == 1:
         return None
-    text = "Which thing is to be followed? x y of its middle in the first picture, pixels"
-    if not known.things:
+    ask = "Which thing is to be followed? "
+    if not things:
+        text = f"{ask}x y of its middle in the first picture, pixels"
         return Question("points", text, known.unseen, "--point 312 221")
-    if len(known.things) == 1:
-        return None
     listed = "; ".join(
         f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
-        for n, ((x, y), (width, height)) in enumerate(known.things.items(), 1)
+        for n, ((x, y), (width, height)) in enumerate(things.items(), 1)
     )
-    likeliest = list(known.things).index(known.likeliest) + 1 if known.likeliest else 1
-    x, y = list(known.things)[likeliest - 1]
-    default = "both" if known.is_pair else str(likeliest)
-    why = f"{len(known.things)} things move, in the order in which they set out: {listed}"
-    text = "Which thing is to be followed? A number, both (one runs into the other), or x y"
-    meant = list(known.things)[:2] if known.is_pair else [(x, y)]
+    why = f"{len(things)} things move, in the order in which they set out: {listed}"
+    likeliest = list(things).index(known.likeliest) if known.likeliest else 0
+    meant = list(things)[:2] if known.is_pair else [list(things)[likeliest]]
     example = " ".join(f"--point {x:.0f} {y:.0f}" for x, y in meant)
+    default = "both" if known.is_pair else str(likeliest + 1)
+    text = f"{ask}A number, both (one runs into the other), or x y"
     return Question("points", text, why, example, default)
 
 
@@ -161,20 +158,16 @@ def _scenario(known: Understood, answers: Answers) -> Question | None:
     likely = known.likely(answers)
     if likely is not None and likely.is_clear:
         return None
+    name = likely.scenario if likely else None
+    why = f"perhaps {name}: {likely.why}" if likely else "the motion could not be followed"
+    example = f"--scenario {name or 'ramp'}"
     text = "What kind of motion is it?"
-    if likely is None:
-        why = "the motion could not be followed"
-        return Question("scenario", text, why, "--scenario ramp", None, tuple(SCENARIOS))
-    why = f"perhaps {likely.scenario}: {likely.why}"
-    example = f"--scenario {likely.scenario}"
-    return Question("scenario", text, why, example, likely.scenario, tuple(SCENARIOS))
+    return Question("scenario", text, why, example, name, tuple(SCENARIOS))
 
 
 def _fps(known: Understood) -> Question | None:
-    seen = known.look.seen
-    if seen is None or not seen.is_in_frames or "fps" in known.declared:
-        return None
-    if known.look.table is not None and known.look.table.frame_s is not None:
+    seen, table = known.look.seen, known.look.table
+    if seen is None or not seen.is_in_frames or (table is not None and table.frame_s is not None):
         return None
     text = "How many frames per second does the camera take?"
     return Question("fps", text, "the table counts frames and has no times", "--fps 30")
@@ -186,15 +179,14 @@ def _units(known: Understood, answers: Answers) -> Question | None:
         return None
     if known.declared.get("pixels_per_metre") is not None:
         return None
-    choices = (*METRES_PER_UNIT, "px")
-    text = "In which unit are its lengths?"
-    size = max(seen.moved)
-    if (unit := _unit_by_gravity(known, answers)) is not None:
-        why = f"it falls as free fall does in {unit}"
-        return Question("track_units", text, why, f"--track-units {unit}", unit, choices, False)
-    default = "px" if size >= 50 else "m" if size <= 20 else "cm"
-    why = f"the table does not say; the way is {size:.4g} long"
-    return Question("track_units", text, why, f"--track-units {default}", default, choices)
+    text, choices = "In which unit are its lengths?", (*METRES_PER_UNIT, "px")
+    unit, size = _unit_by_gravity(known, answers), max(seen.moved)
+    why = f"it falls as free fall does in {unit}"
+    if is_open := unit is None:
+        unit = "px" if size >= 50 else "m" if size <= 20 else "cm"
+        why = f"the table does not say; the way is {size:.4g} long"
+    option = f"--track-units {unit}"
+    return Question("track_units", text, why, option, unit, choices, is_open)
 
 
 def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
@@ -211,11 +203,8 @@ def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
     shown = np.isfinite(place).all(axis=0)
     fallen = [accelerations(seconds[shown], one[shown]) for one in place]
     size = max((abs(float(np.median(one))) for one in fallen if one.size), default=0.0)
-    fits = [
-        unit
-        for unit, metres in METRES_PER_UNIT.items()
-        if FALL_M_S2[0] < size * metres < FALL_M_S2[1]
-    ]
+    low, high = FALL_M_S2
+    fits = [unit for unit, metres in METRES_PER_UNIT.items() if low < size * metres < high]
     return fits[0] if len(fits) == 1 else None
 
 
@@ -226,32 +215,31 @@ def _angle(known: Understood, answers: Answers) -> Question | None:
     text = "What is the ramp's angle to the horizontal, in degrees, as measured?"
     likely = known.likely(answers)
     told = likely.slope_deg if likely is not None else None
+    option, default = "--ramp-angle 20", "path"
     if known.is_film and told is None and (known.is_pair or known.foot is not None):
         why = "else it is taken from the path in the picture"
-        return Question("ramp_angle_deg", text, why, "--ramp-angle 20", "path", (), False)
-    if told is None or likely is None or not likely.is_clear:
-        why = "friction cannot be told from slope without it"
-        return Question("ramp_angle_deg", text, why, "--ramp-angle 20")
-    why = f"else it is taken from the path, which lies at {told:.1f} degrees"
-    return Question("ramp_angle_deg", text, why, f"--ramp-angle {told:.0f}", "path", (), False)
+    elif told is None or likely is None or not likely.is_clear:
+        why, default = "friction cannot be told from slope without it", None
+    else:
+        why = f"else it is taken from the path, which lies at {told:.1f} degrees"
+        option = f"--ramp-angle {told:.0f}"
+    return Question("ramp_angle_deg", text, why, option, default, (), default is None)
 
 
 def _scale(known: Understood, answers: Answers) -> Question | None:
     scenario = known.scenario(answers)
     unit = known.look.seen.unit if known.look.seen else "px"
     unit = known.declared.get("track_units") or answers.get("track_units") or unit
-    is_told = {"rectangle", "pixels_per_metre"} & set(known.declared)
     table = known.look.table
+    is_told = {"rectangle", "pixels_per_metre"} & set(known.declared)
     is_told = is_told or (table is not None and table.calibration is not None)
     on_surface = scenario is not None and (scenario.has_ramp or scenario.line == "level")
     if unit != "px" or is_told or not on_surface or known.has_objects:
         return None
     text = "How many pixels are a metre? Pixels, such as 900 px"
-    size = _length_px(known, answers)
-    if size is not None:
-        text += (
-            f"; or, good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
-        )
+    if (size := _length_px(known, answers)) is not None:
+        good_to = f"good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
+        text += f"; or, {good_to}"
     why = "friction cannot be told from lengths in pixels"
     if known.is_film:
         why += (
@@ -297,10 +285,7 @@ def _scale_of(text: str, length: float | None) -> dict[str, Any]:
 
 
 def _number(text: str, key: str) -> float:
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        raise InputError(f"{key}: {text!r} is not a number") from None
-    if not math.isfinite(value):
-        raise InputError(f"{key}: {text!r} is not a number")
-    return value
+    with contextlib.suppress(ValueError):
+        if math.isfinite(value := float(text.replace(",", "."))):
+            return value
+    raise InputError(f"{key}: {text!r} is not a number")

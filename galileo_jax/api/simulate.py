@@ -1,6 +1,5 @@
 """`simulate`: a clip with known truth, or a series of them."""
 
-import html
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,8 +9,8 @@ from typing import Any, Literal
 from galileo_jax.api.options import options_of
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.simulation.clip_files import TRUTH_SUFFIX, YAML_SUFFIX
 from galileo_jax.simulation.clip_writer import write_clips
 from galileo_jax.simulation.motion import Solver
@@ -35,17 +34,12 @@ class Simulated:
     paths: tuple[Path, ...]
 
     def __repr__(self) -> str:
-        """In one line."""
         return f"<Simulated {', '.join(str(clip) for clip in self.clips)}>"
 
     def _repr_html_(self) -> str:
-        rows = [
-            (str(clip), truth["scenario"], truth["effect"])
-            for clip, truth in zip(self.clips, self.truths, strict=True)
-        ]
-        cells = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
-        head = "<tr><th>clip</th><th>scenario</th><th>hidden effect</th></tr>"
-        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+        columns = {"scenario": "scenario", "effect": "hidden effect"}
+        rows = pd.DataFrame(self.truths, [str(clip) for clip in self.clips])
+        return rows[[*columns]].rename(columns=columns)._repr_html_()  # pyright: ignore
 
 
 @in_float64
@@ -86,8 +80,8 @@ def simulate(
     exposure: float = 0.008,
     defocus: float = 0.0,
     missed_frames: int = 0,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Simulated:
     """Makes a clip with known truth: NAME.mp4 (or NAME.csv), NAME.yaml and NAME.truth.json.
 

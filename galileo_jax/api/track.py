@@ -2,14 +2,15 @@
 
 import itertools
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from galileo_jax.api.clips import ClipLike, as_clip, as_list
+from galileo_jax.api.precompile import Compile, precompiling
 from galileo_jax.clip.checks import check_same_objects, check_scale
 from galileo_jax.clip.load import with_corrections
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -18,16 +19,14 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.observation.observation import Observation
+from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.track_chart import track_chart
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.tracking.track import Track as PixelTrack
 from galileo_jax.tracking.track import write_pixel_csv
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import plotly.graph_objects as go
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +68,9 @@ class Track:
         x along the travel, y up, origin at the foot of the ramp; NaN where it was not seen. Of a
         video also `x_px, y_px`; without a scale only these.
         """
-        import pandas as pd
-
         parts = []
-        for k, name in enumerate(item.name for item in self.clip.objects):
-            columns: dict[str, Any] = {}
+        for k, item in enumerate(self.clip.objects):
+            columns: dict[str, Any] = {"object": item.name}
             if self.measurement is not None:
                 seen = self.measurement.whole
                 sd = np.sqrt(np.diagonal(seen.covariance_m2[k], axis1=0, axis2=1))
@@ -81,20 +78,15 @@ class Track:
                 columns |= {f"{axis}_m": seen.position_m[k, i] for i, axis in enumerate("xy")}
                 columns |= {f"sd_{axis}_m": sd[:, i] for i, axis in enumerate("xy")}
                 columns |= {"is_visible": seen.mask[k]}
-            if self.pixels is not None:
-                columns |= {"time_s": self.pixels.times_s}
-                columns |= {
-                    f"{axis}_px": self.pixels.position_px[k, :, i] for i, axis in enumerate("xy")
-                }
-                columns.setdefault("is_visible", self.pixels.is_visible[k])
-            parts.append(pd.DataFrame({"object": name, **columns}))
+            if (px := self.pixels) is not None:
+                columns |= {"time_s": px.times_s}
+                columns |= {f"{axis}_px": px.position_px[k, :, i] for i, axis in enumerate("xy")}
+                columns.setdefault("is_visible", px.is_visible[k])
+            parts.append(pd.DataFrame(columns))
         return pd.concat(parts, ignore_index=True)
 
     def plot(self) -> "go.Figure":
         """Positions and velocities over time, one panel per axis."""
-        from galileo_jax.report.draw import to_plotly
-        from galileo_jax.report.track_chart import track_chart
-
         return to_plotly(track_chart(self.observation, self.name))
 
     def save(self, path: str | Path) -> Path:
@@ -140,15 +132,12 @@ class Track:
             raise InputError(f"{self.clip.path}: video: missing; a csv track is already tracked")
         picture, film = Path(folder) / "overlay.png", Path(folder) / "overlay.mp4"
         drawn = itertools.count(1)
+
+        def advance() -> None:
+            progress.report("drawing the overlay", next(drawn) / len(pixels.times_s))
+
         write_overlay_picture(picture, decode.frames(video), pixels)
-        write_overlay_video(
-            film,
-            decode.frames(video),
-            pixels,
-            advance=lambda: progress.report(
-                "drawing the overlay", next(drawn) / len(pixels.times_s)
-            ),
-        )
+        write_overlay_video(film, decode.frames(video), pixels, advance=advance)
         return picture, film
 
     def _measured(self) -> Measurement:
@@ -158,7 +147,6 @@ class Track:
         return self.measurement
 
     def __repr__(self) -> str:
-        """In one line."""
         names = ", ".join(item.name for item in self.clip.objects)
         return f"<Track {self.name}: {names}, {self.clip.frame_count} frames>"
 
@@ -180,8 +168,8 @@ def track(
     *,
     pixels_per_metre: float | None = None,
     correct: Mapping[str, Sequence[Sequence[float]]] | None = None,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Track:
     """Follows the objects of a clip through its video, or reads its csv track.
 
@@ -208,35 +196,27 @@ def track(
       ['object', 'time_s', 'x_m', 'y_m', 'sd_x_m', 'sd_y_m', 'is_visible']
     """
     with progress.scope(on_progress, cancel):
-        found = _tracked(with_corrections(as_clip(clip, pixels_per_metre), correct or {}))
+        clip = with_corrections(as_clip(clip, pixels_per_metre), correct or {})
+        has_table = SCENARIOS[clip.scenario].has_table
+        if has_table and not clip.is_scale_known and clip.video is not None:
+            found = Track(clip, track_once(clip), None)
+        else:
+            (found,) = tracks_of([measure(clip)])
         progress.report("tracked", 1.0)
         return found
-
-
-def _tracked(clip: Clip) -> Track:
-    if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known and clip.video is not None:
-        return Track(clip, track_once(clip), None)
-    return tracks_of([measure(clip)])[0]
 
 
 def as_measurements(
     tracks: TrackLike | Sequence[TrackLike],
     pixels_per_metre: float | None,
-    before: Callable[[Sequence[Clip]], Callable[[], None]] = lambda _: lambda: None,
+    compile_for: Compile | None = None,
 ) -> tuple[list[Measurement], float]:
-    """The measurements of trials of the same objects, tracked where they are not.
+    """The measurements of trials of the same objects, and how long tracking took, s.
 
     Args:
-      tracks: one or several, or the clips, or their files.
+      tracks: one or several, or the clips, or their files, which are tracked.
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
-      before: is given the clips, once they are checked, if any is to be tracked: what can go on
-        beside that begins; what it returns is called when all are tracked.
-
-    Returns:
-      the measurements, and how long tracking took, s.
-
-    Raises:
-      InputError: a clip is wrong, or they are not trials of the same objects.
+      compile_for: see `precompiling`, which goes on beside what is to be tracked.
     """
     given = as_list(tracks)
     if not given:
@@ -247,14 +227,13 @@ def as_measurements(
     for clip in clips:
         check_scale(clip)
     check_same_objects(clips)
-    if all(isinstance(one, Track) for one in given) and pixels_per_metre is None:
+    is_tracked = [isinstance(one, Track) and pixels_per_metre is None for one in given]
+    if all(is_tracked):
         return [one._measured() for one in given], 0.0
-    join = before(clips)
     began = time.perf_counter()
     measured = []
-    for i, (one, clip) in enumerate(zip(given, clips, strict=True)):
-        with progress.part(i / len(clips), (i + 1) / len(clips)):
-            is_done = isinstance(one, Track) and pixels_per_metre is None
-            measured.append(one._measured() if is_done else measure(clip))
-    join()
+    with precompiling(clips, compile_for):
+        for i, clip in enumerate(clips):
+            with progress.part(i / len(clips), (i + 1) / len(clips)):
+                measured.append(given[i]._measured() if is_tracked[i] else measure(clip))
     return measured, time.perf_counter() - began

@@ -27,16 +27,14 @@ def with_track_doubts(
     measurements: Sequence[Measurement], result: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The result with its status and warnings saying so where the tracks cannot be trusted."""
-    lost = [str(one) for measured in measurements for one in measured.astray]
-    chi2 = result["error"]["chi2_per_dof"]
-    is_far = not chi2 <= FAR
-    if not lost and not is_far:
-        return dict(result)
-    found = dict(result)
-    found_wrong = lost or [f"no motion of this model comes close to the track (chi2 {chi2:.0f})"]
-    found["status"] = "; but ".join([*filter(None, [result.get("status")]), ", ".join(found_wrong)])
-    if is_far and not lost:
+    wrong = [str(one) for measured in measurements for one in measured.astray]
+    found, chi2 = dict(result), result["error"]["chi2_per_dof"]
+    if not wrong and not chi2 <= FAR:
+        wrong = [f"no motion of this model comes close to the track (chi2 {chi2:.0f})"]
         found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
+    if wrong:
+        said = [result["status"]] if result.get("status") else []
+        found["status"] = "; but ".join([*said, ", ".join(wrong)])
     return found
 
 

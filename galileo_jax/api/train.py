@@ -4,23 +4,24 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from galileo_jax.files.package_data import config_path
+from galileo_jax.neural import evaluation
+from galileo_jax.neural.config import TrainConfig, load_config
+from galileo_jax.neural.dataset import load_or_make
+from galileo_jax.neural.task import make_task
+from galileo_jax.neural.training import train as train_network
+from galileo_jax.report.chart import Chart, Line, Panel
+from galileo_jax.report.draw import to_svg
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import check_folder, write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import CancelFlag, OnProgress
-
-if TYPE_CHECKING:
-    from galileo_jax.neural.config import TrainConfig
-    from galileo_jax.neural.evaluation import Evaluation
-    from galileo_jax.report.chart import Chart
 
 PRESETS = ("thesis", "galileo")
 LEAST = {"samples": 100, "max_epochs": 1, "frames": 25, "seed": 0}
@@ -29,14 +30,10 @@ SHARE_DATA = 0.5  # of the time, about, that goes into the samples
 
 @dataclass(frozen=True)
 class Trained:
-    """A finished training.
+    """A finished training of `seconds`, `data_seconds` of them for the samples.
 
-    Attributes:
-      folder: with network.npz, loss.svg, training.json, and a checkpoint to go on from.
-      losses: (training, validation) of every epoch.
-      best_validation_loss: of the network that was saved.
-      seconds: of the call, s.
-      data_seconds: of these, for the samples, s.
+    In `folder` are network.npz, loss.svg, training.json, and a checkpoint to go on from; `losses`
+    are (training, validation) of every epoch.
     """
 
     folder: Path
@@ -46,7 +43,6 @@ class Trained:
     data_seconds: float
 
     def __repr__(self) -> str:
-        """In one line."""
         epochs, loss = len(self.losses), self.best_validation_loss
         return f"<Trained {self.folder}: {epochs} epochs, validation loss {loss:.5f}>"
 
@@ -63,8 +59,8 @@ def train(
     frames: int | None = None,
     seed: int | None = None,
     engine: Literal["auto", "rigid", "c", "mjx"] | None = None,
-    on_progress: OnProgress | None = None,
-    cancel: CancelFlag | None = None,
+    on_progress: progress.OnProgress | None = None,
+    cancel: progress.CancelFlag | None = None,
 ) -> Trained:
     """Trains a network on simulated samples, or goes on where an earlier call stopped.
 
@@ -95,23 +91,16 @@ def train(
     for name, least in LEAST.items():
         value = overrides[name]
         if value is not None and not (isinstance(value, int) and value >= least):
-            option = name.replace("_", "-")
-            raise InputError(f"--{option}: '{value}' is not a whole number, {least} or more")
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"{option}: '{value}' is not a whole number, {least} or more")
     out = Path(out)
     check_folder(out)
-    from galileo_jax.neural.config import load_config
-
     path = Path(config) if config else config_path(f"train_{preset}.yaml")
     with progress.scope(on_progress, cancel):
         return _train(out, load_config(path, **overrides), Path(data or out / "data"))
 
 
-def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
-    from galileo_jax.neural.dataset import load_or_make
-    from galileo_jax.neural.task import make_task
-    from galileo_jax.neural.training import train as train_network
-    from galileo_jax.report.draw import to_svg
-
+def _train(out: Path, config: TrainConfig, data_folder: Path) -> Trained:
     task = make_task(config)
     began = time.perf_counter()
     with progress.part(0.0, SHARE_DATA):
@@ -121,22 +110,18 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
         done = train_network(task, config, samples, out)
     write_text(out / "loss.svg", to_svg(_loss_chart(done.losses)))
     seconds = time.perf_counter() - began
-    write_json(
-        out / "training.json",
-        {
-            "config": config.model_dump(),
-            "epochs": done.epoch,
-            "best_validation_loss": done.best,
-            "seconds": {"data": round(data_s, 1), "all": round(seconds, 1)},
-        },
-    )
+    record = {
+        "config": config.model_dump(),
+        "epochs": done.epoch,
+        "best_validation_loss": done.best,
+        "seconds": {"data": round(data_s, 1), "all": round(seconds, 1)},
+    }
+    write_json(out / "training.json", record)
     return Trained(out, done.losses, done.best, seconds, data_s)
 
 
-def _loss_chart(losses: Sequence[tuple[float, float]]) -> "Chart":
+def _loss_chart(losses: Sequence[tuple[float, float]]) -> Chart:
     """`losses`: `(training, validation)` of every epoch."""
-    from galileo_jax.report.chart import Chart, Line, Panel
-
     values = np.asarray(losses)
     epochs = np.arange(1, len(values) + 1)
     lines = tuple(
@@ -148,18 +133,10 @@ def _loss_chart(losses: Sequence[tuple[float, float]]) -> "Chart":
 
 
 @in_float64
-def evaluate_network(network: str | Path) -> "Evaluation":
+def evaluate_network(network: str | Path) -> evaluation.Evaluation:
     """Tests a trained network on 1,000 new samples (the command's --test).
 
-    Args:
-      network: the folder of a training, where test.json is written, or a network's file.
-
-    Returns:
-      `found`: measure to its value; `reference`: what others reach in the same test.
-
-    Raises:
-      InputError: there is no network of this version.
+    `network`: the folder of a training, where test.json is written, or a network's file. Of the
+    result, `found` is measure to its value, `reference` what others reach in the same test.
     """
-    from galileo_jax.neural import evaluation
-
     return evaluation.evaluate_network(Path(network))

@@ -1,7 +1,8 @@
-"""`understand`: what a film or table shows, what its yaml declares, and what is still open."""
+"""What a film or table shows, in words and in a picture; what its yaml says and leaves open."""
 
+import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,15 +11,28 @@ import numpy as np
 
 from galileo_jax.api.look import Look, look
 from galileo_jax.clip.load import check_clip, yaml_of
-from galileo_jax.clip.look import Likely, likely_in_plane, usual_shape
+from galileo_jax.clip.look import Likely, Seen, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.scenarios.scenario import Scenario
+from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import MAX_STEP_S
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.report.marked_picture import Marked, write_marked_picture
+from galileo_jax.report.phrases import listed
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 
+KINDS = {
+    "from_above": "a motion seen from above",
+    "level": "a slide along a level table",
+    "liquid": "a fall in a liquid",
+    "multi": "several objects on a ramp",
+}
+HOW = {"a ": "along", "one coordinate": "in", "turns": "and", "an angle": "as"}
+"""What stands before what speaks for a kind of motion."""
+
+PICTURE = "what_moves.png"
 USUAL_FPS = 30.0
 MOST_PICTURES = 6000
 """Of a film in which a motion is looked for: to look at one takes up to 10 ms, and nobody waits for
@@ -31,12 +45,10 @@ Answers = Mapping[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class FilmPath:
-    """The way that a thing takes through a film.
+    """The way that a thing takes through a film, and in which `direction` of the picture.
 
-    Attributes:
-      likely: the kind of motion; None where the thing cannot be followed.
-      direction: in which it goes in the picture.
-      way_px: `[2, place]`, where it is one picture after the other; None: not known.
+    `likely`: the kind of motion; None where the thing cannot be followed. `way_px`: `[2, place]`,
+    where it is one picture after the other; None: not known.
     """
 
     likely: Likely | None
@@ -116,17 +128,16 @@ class Understood:
 
     def scenario(self, answers: Answers) -> Scenario | None:
         """The kind of motion: as declared, as answered, as it seems; None: nobody knows."""
-        likely = self.likely(answers) if not {"scenario"} & {*self.declared, *answers} else None
         name = self.declared.get("scenario") or answers.get("scenario")
-        name = name or (likely.scenario if likely else None)
-        return SCENARIOS.get(name) if name is not None and name in SCENARIOS else None
+        if name is None and not {"scenario"} & {*self.declared, *answers}:
+            name = likely.scenario if (likely := self.likely(answers)) else None
+        return SCENARIOS[name] if name is not None and name in SCENARIOS else None
 
     def path(self, point: Point) -> FilmPath:
         """The way of the thing at a place of the first frame; it is followed once."""
         if point not in self._paths:
-            self._paths[point] = _followed(
-                self.source, self.yaml_path, point, self.look.fps or USUAL_FPS
-            )
+            fps = self.look.fps or USUAL_FPS
+            self._paths[point] = _followed(self.source, self.yaml_path, point, fps)
         return self._paths[point]
 
 
@@ -134,9 +145,6 @@ def understand(file: str | Path) -> Understood:
     """Looks at a film or table, or at the one that a yaml names; nothing is written.
 
     What moves is looked for in a film whose yaml names no objects.
-
-    Raises:
-      InputError: there is no such file, or it cannot be read.
     """
     source = path = Path(file)
     yaml_path = yaml_of(path)
@@ -152,9 +160,7 @@ def understand(file: str | Path) -> Understood:
     found = look(source, fps=float(fps) if isinstance(fps, int | float) and fps > 0 else None)
     _check_clock(found)
     known = Understood(source, yaml_path, declared, found)
-    if not known.is_film or known.has_objects:
-        return known
-    return _with_things(known)
+    return _with_things(known) if known.is_film and not known.has_objects else known
 
 
 def is_declared(file: str | Path) -> bool:
@@ -171,8 +177,9 @@ def is_declared(file: str | Path) -> bool:
         return False
     if declared.get("video") is not None and "fps" not in declared:
         return False
-    kind = SCENARIOS.get(str(scenario)) if str(scenario) in SCENARIOS else None
-    return kind is None or not needs_angle(kind) or "ramp_angle_deg" in declared
+    is_known = str(scenario) in SCENARIOS
+    has_angle = "ramp_angle_deg" in declared
+    return has_angle or not is_known or not needs_angle(SCENARIOS[str(scenario)])
 
 
 def needs_angle(scenario: Scenario) -> bool:
@@ -198,13 +205,12 @@ def _check_length(film: Path) -> None:
 def _check_clock(found: Look) -> None:
     """Refuses a table whose rows are too far apart in time to show a motion."""
     seen = found.seen
-    if seen is None or seen.is_in_frames or not seen.step >= MAX_STEP_S:
-        return
-    raise InputError(
-        f"{found.path}: its rows are {seen.step:g} s apart: no motion shows in that; a table of "
-        f"places less than {MAX_STEP_S:g} s apart expected (if its times are milliseconds or "
-        "frame numbers, divide them by 1000 or by the frame rate)"
-    )
+    if seen is not None and not seen.is_in_frames and seen.step >= MAX_STEP_S:
+        raise InputError(
+            f"{found.path}: its rows are {seen.step:g} s apart: no motion shows in that; a table "
+            f"of places less than {MAX_STEP_S:g} s apart expected (if its times are milliseconds "
+            "or frame numbers, divide them by 1000 or by the frame rate)"
+        )
 
 
 def _with_things(known: Understood) -> Understood:
@@ -238,3 +244,86 @@ def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPa
         return FilmPath(None)
     direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
     return FilmPath(likely_in_plane(x, y), direction, np.stack([x, y]))
+
+
+def sentence_of(known: Clip | Understood, answers: Answers) -> str:
+    """What moves, how far and how, what it looks like, and how often it is seen."""
+    if isinstance(known, Clip):
+        return _of_clip(known)
+    if known.look.seen is not None:
+        return _of_table(known.look.seen)
+    fps = known.look.fps
+    rate = f" {fps:.4g} pictures a second." if fps else ""
+    return f"{_of_film(known, answers)}{rate}"
+
+
+def _of_film(known: Understood, answers: Answers) -> str:
+    points = known.points(answers)
+    if known.has_objects:
+        return f"{known.yaml_path.name} says where the objects are."
+    if not points:
+        return f"No moving thing was found: {known.unseen}."
+    things = "One thing moves" if len(known.things) < 2 else f"{len(known.things)} things move"
+    if len(points) > 1:
+        return f"{things}, one after the other: it looks like {_kind('ramp')}."
+    path = known.path(points[0])
+    if path.likely is None:
+        return f"{things}, but cannot be followed."
+    which = "," if len(known.things) < 2 else "; the one that is followed goes"
+    return f"{things}{which} {path.moved_px:.0f} px {_looks(path.likely)}."
+
+
+def _of_table(seen: Seen) -> str:
+    unit = "rad" if seen.axes == ("angle",) else seen.unit or "(in a unit that it does not say)"
+    who = "One thing moves" if len(seen.names) == 1 else f"{len(seen.names)} things move"
+    rate = "counted in pictures" if seen.is_in_frames else f"{1 / seen.step:.3g} a second"
+    looks = _looks(seen)
+    return f"{who}, {math.hypot(*seen.moved):.3g} {unit} {looks}. {seen.num_rows} rows, {rate}."
+
+
+def _looks(likely: Likely) -> str:
+    how = next((f"{word} {likely.why}" for start, word in HOW.items()
+                if likely.why.startswith(start)), f"({likely.why})")  # fmt: skip
+    return f"{how}: it looks like {_kind(likely.scenario)}"
+
+
+def _kind(scenario: str) -> str:
+    article = "an" if scenario[0] in "aeiou" else "a"
+    return KINDS.get(scenario, f"{article} {scenario}")
+
+
+def _of_clip(clip: Clip) -> str:
+    angle = clip.ramp_angle_deg
+    at = f" at {angle:g} degrees" if angle is not None else ""
+    names = listed([item.name for item in clip.objects])
+    return f"{clip.path.name} says all that is needed: {_kind(clip.scenario)}{at}, {names}."
+
+
+def write_marks(known: Understood, path: str | Path) -> Path:
+    """Writes the first picture of a film, its things numbered in the order in which they set out.
+
+    Of a film whose yaml names its objects these are marked. Raises `InputError` where it is no
+    film, or the picture cannot be written.
+    """
+    if not known.is_film:
+        raise InputError(f"{known.source}: a table has no picture; look(...).plot draws its places")
+    from galileo_jax.video import decode  # and OpenCV, which a table does not need
+
+    frame = next(decode.frames(known.source))[..., ::-1]
+    try:
+        return write_marked_picture(Path(path), frame, [*_things(known)])
+    except (OSError, ValueError) as error:  # Matplotlib knows no such suffix
+        raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def _things(known: Understood) -> Iterable[Marked]:
+    """What is listed in the question, or what is declared."""
+    for number, (point, size) in enumerate(known.things.items(), 1):
+        way = known.path(point)
+        slope = way.likely.slope_deg if way.likely is not None else None
+        yield Marked(str(number), point, size, way.way_px, slope)
+    declared = known.declared.get("objects")
+    for item in declared if isinstance(declared, list) else ():
+        point = item.get("point_px") if isinstance(item, dict) else None
+        if isinstance(point, list) and len(point) == 2:
+            yield Marked(str(item.get("name", "")), (float(point[0]), float(point[1])))

@@ -52,22 +52,14 @@ def notes_on(fit: "Fit", out: Path) -> None:
 
 
 def out_folder(out: Path | None, clips: "Sequence[Clip]", below: str = "") -> Path:
-    """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it.
-
-    Raises:
-      InputError: it is a file, or nothing can be written there.
-    """
+    """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it."""
     folder = out or Path("runs") / "+".join(clip.path.stem for clip in clips)
     check_folder(folder)
     return folder if out else folder / below
 
 
 def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
-    """`--correct` as the functions take it.
-
-    Raises:
-      InputError: a number is none.
-    """
+    """`--correct` as the functions take it."""
     found: dict[str, list[list[float]]] = {}
     for name, *values in given:
         try:

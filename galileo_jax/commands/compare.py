@@ -5,15 +5,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import galileo_jax as gx
-from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import (
-    add_clip_options,
-    load_clips,
-    out_folder,
-    warn_of_tracks,
-)
+from galileo_jax.commands import clip_options, command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
@@ -31,13 +24,13 @@ def main(argv: Sequence[str]) -> None:
         out = out or Path(runs[0]) / "compare"
         check_folder(out)
     else:
-        sources = load_clips(sources, asked.get("pixels_per_metre"))
-        out = out_folder(out, sources, "compare")
-    with progress_display() as display:
+        sources = clip_options.load_clips(sources, asked.get("pixels_per_metre"))
+        out = clip_options.out_folder(out, sources, "compare")
+    with command.progress_display() as display:
         compared = gx.compare(runs[0] if runs else sources, **asked, on_progress=display)
         display("writing the page", 1.0)
         compared.save(out)
-    warn_of_tracks(compared.fit.measurements)
+    clip_options.warn_of_tracks(compared.fit.measurements)
     print("\n".join(_lines(compared)))
     command.say(f"{out}/compare.json, {out}/report.html")
 
@@ -75,5 +68,5 @@ def _parser() -> VerbParser:
     what = "video, its yaml, a csv track, or a run"
     parser.add("fit", nargs="+", metavar="CLIP|RUN", help=what)
     parser.add("effects", metavar="A,B", help="effects in the model (default: none)")
-    add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
+    clip_options.add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
     return parser

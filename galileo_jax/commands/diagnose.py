@@ -5,15 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import galileo_jax as gx
-from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import (
-    add_clip_options,
-    load_clips,
-    out_folder,
-    warn_of_tracks,
-)
+from galileo_jax.commands import clip_options, command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import hidden_effect
 
 NUM_CANDIDATES = 5
@@ -24,10 +17,10 @@ FRICTIONS = ("k1", "k2")
 def main(argv: Sequence[str]) -> None:
     """Diagnoses clips; writes diagnosis.json, a page, and a run of the model it ends with."""
     asked = _parser().asked(argv)
-    clips = load_clips(asked.pop("tracks"), asked.get("pixels_per_metre"))
-    out = out_folder(asked.pop("out", None), clips, "diagnosis")
+    clips = clip_options.load_clips(asked.pop("tracks"), asked.get("pixels_per_metre"))
+    out = clip_options.out_folder(asked.pop("out", None), clips, "diagnosis")
     svg, hidden = asked.pop("svg", False), hidden_effect(clips[0])
-    with progress_display() as display:
+    with command.progress_display() as display:
         rows: list[Mapping[str, Any]] = []
 
         def show(partial: Mapping[str, Any]) -> None:
@@ -41,7 +34,7 @@ def main(argv: Sequence[str]) -> None:
         print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
         found.save(out, svg=svg)
-    warn_of_tracks(found.measurements)
+    clip_options.warn_of_tracks(found.measurements)
     command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
 
 
@@ -123,5 +116,5 @@ def _parser() -> VerbParser:
         action="store_true",
         help="also write the residuals before and after each effect as SVG (plots/)",
     )
-    add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
+    clip_options.add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
     return parser

@@ -7,7 +7,6 @@ from typing import Any
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser, whole_number
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.experiment.settings import text_of
 
 
@@ -15,7 +14,7 @@ def main(argv: Sequence[str]) -> None:
     """Runs the loop; prints every experiment and every verdict when it is there."""
     asked = _parser().asked(argv)
     out = asked.setdefault("out", Path("runs") / (Path(asked["lab"]).stem or "lab"))
-    with progress_display() as display:
+    with command.progress_display() as display:
 
         def show(partial: Mapping[str, Any]) -> None:
             if "experiment" in partial:

@@ -15,7 +15,6 @@ import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import fit_table, notes_on, out_folder, warn
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.commands.stop import stoppable
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime import progress
@@ -52,7 +51,7 @@ def main(argv: Sequence[str]) -> None:
             clips = _clips(files, said, flag, to)
             out = out_folder(to, clips)
             warn(warning for clip in clips for warning in clip.warnings)
-            with progress_display() as display:
+            with command.progress_display() as display:
                 found = gx.explain(clips, out=out, **how, on_progress=display, cancel=flag)
     except (KeyboardInterrupt, Cancelled):
         raise KeyboardInterrupt(_kept(files)) from None
@@ -123,7 +122,7 @@ def _clips(
     from galileo_jax.api.explain import answered_clips, sources_of, understood
 
     def look_at(clip: Any, said: Mapping[str, Any]) -> "gx.Clip | Understood":
-        with progress_display() as display, progress.scope(display, flag):
+        with command.progress_display() as display, progress.scope(display, flag):
             return understood(clip, said)
 
     def ask(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
@@ -139,23 +138,16 @@ def _clips(
 def asked(known: "Understood", answers: dict[str, Any], out: Path | None = None) -> dict[str, Any]:
     """Asks at the terminal for all that is open; Enter takes what stands in brackets.
 
-    Of a film a picture of what is asked about is written and, if there is a display, opened.
-
-    Args:
-      known: what the file shows.
-      answers: that the call gave.
-      out: where results go; None: where they go by default.
-
-    Raises:
-      InputError: the input ended (Ctrl-D) before all was answered.
+    Of a film a picture of what is asked about is written to where results go and, if there is a
+    display, opened. Raises `InputError` where the input ended (Ctrl-D) before all was answered.
     """
     from galileo_jax.api.questions import Question, parsed, questions
-    from galileo_jax.api.seen_sentence import sentence_of
+    from galileo_jax.api.understand import sentence_of
 
     is_first = True
 
     def still_open() -> Sequence[Question]:
-        with progress_display() as display, progress.scope(display):
+        with command.progress_display() as display, progress.scope(display):
             return questions(known, answers)  # of a film what moves may have to be followed
 
     while open_ones := still_open():
@@ -180,11 +172,11 @@ def _show_marks(known: "Understood", folder: Path) -> None:
     """Writes the picture that goes with the questions; asking goes on where it cannot be."""
     if not known.is_film:
         return
-    from galileo_jax.api.marked_picture import NAME, write_marks
+    from galileo_jax.api.understand import PICTURE, write_marks
 
     try:
-        with progress_display() as display, progress.scope(display):
-            picture = write_marks(known, folder / NAME)
+        with command.progress_display() as display, progress.scope(display):
+            picture = write_marks(known, folder / PICTURE)
     except InputError as error:
         command.say(f"warning: {error}")
         return

@@ -4,16 +4,8 @@ from collections.abc import Sequence
 
 import galileo_jax as gx
 from galileo_jax.api.options import ignored_options
-from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import (
-    add_clip_options,
-    fit_table,
-    load_clips,
-    notes_on,
-    out_folder,
-)
+from galileo_jax.commands import clip_options, command
 from galileo_jax.commands.options import VerbParser, refuse, whole_number
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime.registry import entry_names
 
@@ -27,10 +19,10 @@ def main(argv: Sequence[str]) -> None:
     asked = _parser().asked(argv)
     ignored, why = ignored_options(asked.get("method", "grad"), asked.get("preset", "galileo"))
     refuse(asked, ignored, why)
-    clips = load_clips(asked.pop("tracks"), asked.pop("pixels_per_metre", None))
-    out = out_folder(asked.pop("out", None), clips)
+    clips = clip_options.load_clips(asked.pop("tracks"), asked.pop("pixels_per_metre", None))
+    out = clip_options.out_folder(asked.pop("out", None), clips)
     truth = true_parameters(clips[0])
-    with progress_display() as display:
+    with command.progress_display() as display:
         from galileo_jax.results.run import CHECKPOINT
         from galileo_jax.results.stale_outputs import PREDICTION
 
@@ -38,13 +30,13 @@ def main(argv: Sequence[str]) -> None:
         display("writing the report", 1.0)
         had_prediction = (out / PREDICTION).is_file()
         found.save(out)
-    print(fit_table(found, truth))
+    print(clip_options.fit_table(found, truth))
     if had_prediction and not (out / PREDICTION).is_file():
         command.say(
             f"{out}: the prediction of the earlier fit was removed; make it again: galileo "
             f"predict {out} --seconds S"
         )
-    notes_on(found, out)
+    clip_options.notes_on(found, out)
     pages = [out] if len(found.names) == 1 else [out / name for name in found.names]
     command.say(", ".join([f"{out}/result.json", *(f"{page}/report.html" for page in pages)]))
 
@@ -61,7 +53,7 @@ def _parser() -> VerbParser:
     parser.add("effects", metavar="A,B", help="effects in the model (default: none)")
     free = f"declared quantities to infer: {FREE} (default: none)"
     parser.add("free", metavar="A,B", help=free)
-    add_clip_options(parser, out="folder of the run (default runs/CLIP)")
+    clip_options.add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     parser.add("discrepancy", "motion", "noise")
     add = parser.group("--method mh")
     add("sampler", choices=SAMPLERS, metavar=None)

@@ -6,7 +6,6 @@ from pathlib import Path
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
@@ -27,7 +26,7 @@ def main(argv: Sequence[str]) -> None:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: a file; the folder of a run expected")
     check_folder(out)
-    with progress_display() as display:
+    with command.progress_display() as display:
         ahead = gx.next_experiment(**asked, on_progress=display)
         display("writing the page", 1.0)
         ahead.save(out)

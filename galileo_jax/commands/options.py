@@ -158,11 +158,7 @@ def flag(name: str) -> str:
 def refuse(
     asked: Mapping[str, Any], names: Iterable[str], why: str, flag: Callable[[str], str] = flag
 ) -> None:
-    """Refuses options that a call gives and would ignore, even with their default.
-
-    Raises:
-      InputError: names the first of them, and says why.
-    """
+    """Refuses options that a call gives and would ignore, even with their default."""
     for name in names:
         if name in asked:
             raise InputError(f"{flag(name)}: {why}")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import galileo_jax as gx
+from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
@@ -18,7 +18,7 @@ def main(argv: Sequence[str]) -> None:
     if out.exists() and not out.is_dir():
         raise InputError(f"{what}: {out} is a file; a folder expected")
     check_folder(out)
-    with progress_display() as display:
+    with command.progress_display() as display:
         ahead = gx.predict(**asked, on_progress=display)
         display("drawing", 1.0)
         written = ahead.save(out)

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser, refuse
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.check_settings import option, options_without_part
 from galileo_jax.simulation.settings import Settings
@@ -24,7 +24,7 @@ def main(argv: Sequence[str]) -> None:
     # Written out with its default value an option is ignored no less; only here it shows.
     for fields, why in options_without_part(Settings(**settings)):
         refuse(asked, fields, why, option)
-    with progress_display() as on_progress:
+    with command.progress_display() as on_progress:
         made = simulate(**asked, on_progress=on_progress)
     print("\n".join(map(str, made.paths)))
 

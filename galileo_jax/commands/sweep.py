@@ -8,7 +8,6 @@ from typing import Any
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 
 MAX_LINES = 10  # failures that are printed one by one
 
@@ -16,7 +15,7 @@ MAX_LINES = 10  # failures that are printed one by one
 def main(argv: Sequence[str]) -> None:
     """Computes what is missing of a sweep, and writes its tables and its page."""
     asked = _parser().asked(argv)
-    with progress_display() as display:
+    with command.progress_display() as display:
         failures = itertools.count(1)
 
         def show(partial: Mapping[str, Any]) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.shown import unit_text
 
 
@@ -14,7 +13,7 @@ def main(argv: Sequence[str]) -> None:
     """Fits tosses together; prints a table and writes tosses.json."""
     asked = _parser().asked(argv)
     out = asked.pop("out", Path("runs/tosses"))
-    with progress_display() as display:
+    with command.progress_display() as display:
         found = gx.fit_tosses(**asked, on_progress=display)
     found.save(out)
     print("\n".join(_lines(found)))

@@ -10,7 +10,6 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import corrections, warn
 from galileo_jax.commands.options import VerbParser
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.atomic_write import check_folder, writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
@@ -25,7 +24,7 @@ def main(argv: Sequence[str]) -> None:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
     out: Path = asked.get("out", Path(f"{clip.path.stem}_track"))
     check_folder(out)
-    with progress_display() as display:
+    with command.progress_display() as display:
         correct = corrections(asked.get("correct", ()))
         found = gx.track(clip, correct=correct, on_progress=display)
         assert found.pixels is not None  # of a video

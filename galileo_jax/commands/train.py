@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.api.train import evaluate_network, train
+import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser, refuse
-from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 
 
@@ -21,7 +20,7 @@ def main(argv: Sequence[str]) -> None:
         refuse(asked, tuple(asked), "--test trains nothing")
         _test(network)
         return
-    with progress_display() as show:
+    with command.progress_display() as show:
 
         def on_progress(stage: str, share: float, partial: Any) -> None:
             if partial is not None:
@@ -29,7 +28,7 @@ def main(argv: Sequence[str]) -> None:
                 stage = f"{stage}, loss {loss:.4f}, rate {rate:.0e}"
             show(stage, share, None)
 
-        done = train(**asked, on_progress=on_progress)
+        done = gx.train(**asked, on_progress=on_progress)
     print(
         f"{len(done.losses)} epochs, validation loss {done.best_validation_loss:.5f}; "
         f"{done.seconds:.0f} s, of which data {done.data_seconds:.0f} s"
@@ -41,6 +40,8 @@ def main(argv: Sequence[str]) -> None:
 
 
 def _test(network: Path) -> None:
+    from galileo_jax.api.train import evaluate_network
+
     done = evaluate_network(network)
     print(f"{done.num_samples} new samples{'':<18}{'found':>10}{'reference':>12}")
     for name, value in done.found.items():

@@ -1,23 +1,16 @@
 """Tables as files, by their suffix."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
-
-if TYPE_CHECKING:
-    import pandas as pd
+from galileo_jax.runtime.lazy import pd
 
 TABLE_FORMATS = ("csv", "parquet")
 
 
 def write_table(path: Path, table: "pd.DataFrame") -> None:
-    """Writes a table to .csv or .parquet, without its index; what is NaN or None is left empty.
-
-    Raises:
-      InputError: pyarrow, an optional dependency of 150 MB, is not installed.
-    """
+    """Writes a table to .csv or .parquet, without its index; what is NaN or None is left empty."""
     with replacing(path) as temporary:
         if path.suffix == ".csv":
             table.to_csv(temporary, index=False, lineterminator="\n")

@@ -37,11 +37,7 @@ PLAIN = {"root", "user", "clip", "film", "video", "track", "box", "sphere", "cyl
 
 @dataclass(frozen=True)
 class Impersonal:
-    """What is said in place of what.
-
-    Attributes:
-      pairs: patterns and their replacements, in the order in which they are applied.
-    """
+    """What is said in place of what: patterns with replacements, in the order of their use."""
 
     pairs: tuple[tuple[re.Pattern[str], str], ...]
 
@@ -80,7 +76,8 @@ def impersonal(
             exact |= dict.fromkeys((str(path), str(path.resolve())), name)
             exact.setdefault(path.name, name)
             words.setdefault(path.stem, f"clip{number}")
-    words |= {name: f"object{n}" for n, name in enumerate(objects, 1) if not _is_plain_object(name)}
+    named = enumerate(objects, 1)
+    words |= {name: f"object{n}" for n, name in named if not re.fullmatch(r"object\d+", name)}
     words |= {name: "USER" for name in _users()} | {name: "HOST" for name in _hosts()}
     exact |= {shlex.quote(key): instead for key, instead in exact.items()}
     pairs = [
@@ -97,10 +94,6 @@ def impersonal(
         if len(word) > 1 and word.lower() not in kept and not re.fullmatch(r"[\d.]*|clip\d+", word)
     ]
     return Impersonal(tuple(pairs))
-
-
-def _is_plain_object(name: str) -> bool:
-    return re.fullmatch(r"object\d+", name) is not None
 
 
 def _own_words() -> set[str]:

@@ -33,10 +33,10 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.resampled import resampled
 from galileo_jax.model.parameters import inverse
+from galileo_jax.runtime.lazy import xr
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
 
 if TYPE_CHECKING:
-    import xarray as xr
     from arviz import InferenceData
 
 NUM_PRIOR_DRAWS = 1000
@@ -67,8 +67,6 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     Limits: draws whose density is not known (of the network, of the thesis's sampler) are not
     weighted: `log_likelihood` is then as good as they are.
     """
-    import xarray as xr
-
     if posterior.names != trials.names:
         raise ValueError(f"posterior of {posterior.names}, but the model has {trials.names}")
     rng = np.random.default_rng([seed, 30])
@@ -105,15 +103,12 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     observed = _chosen(trials, [problem.data.observed_m[None] for problem in trials.problems])[0]
     index = {"chain": [0], "draw": np.arange(NUM_PRIOR_DRAWS)}
     metres = {"units": "m", "long_name": "position"}
+    seen = {"position": ("measurement", observed, metres)}
     data.add_groups(
-        {
-            "prior": xr.Dataset(prior, index),
-            "posterior_predictive": group(predicted, indices, metres),
-            "log_likelihood": group(density, like_indices, nats),
-            "observed_data": xr.Dataset(
-                {"position": ("measurement", observed, metres)}, measurement
-            ),
-        }
+        prior=xr.Dataset(prior, index),
+        posterior_predictive=group(predicted, indices, metres),
+        log_likelihood=group(density, like_indices, nats),
+        observed_data=xr.Dataset(seen, measurement),
     )
     return data
 
@@ -135,24 +130,18 @@ def _chosen(trials: JointProblem, values: list[np.ndarray]) -> np.ndarray:
 
 def _measurement(trials: JointProblem) -> dict[str, tuple]:
     """The coordinates of the dimension `measurement`, as xarray takes them."""
-    columns: dict[str, list[np.ndarray]] = {}
+    parts = []
     for problem, compared in zip(trials.problems, _is_compared(trials), strict=True):
         thing, axis, frame = np.nonzero(compared)
-        found = {
-            "clip": np.full(len(frame), problem.name),
-            "object": np.array(problem.observation.names)[thing],
-            "axis": np.array(AXES)[axis],
-            "frame": frame,
-            "time_s": problem.observation.times_s[frame],
-        }
-        for name, values in found.items():
-            columns.setdefault(name, []).append(values)
-    joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    attrs = {"time_s": {"units": "s"}}
-    return {
-        "measurement": ("measurement", np.arange(len(joined["frame"]))),
-        **{name: ("measurement", values, attrs.get(name, {})) for name, values in joined.items()},
-    }
+        seen = problem.observation
+        clip = np.full(len(frame), problem.name)
+        time_s = seen.times_s[frame]
+        parts.append((clip, np.array(seen.names)[thing], np.array(AXES)[axis], frame, time_s))
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    named = dict(zip(("clip", "object", "axis", "frame", "time_s"), columns, strict=True))
+    units = {"time_s": {"units": "s"}}
+    along = {name: ("measurement", values, units.get(name, {})) for name, values in named.items()}
+    return {"measurement": ("measurement", np.arange(len(columns[0]))), **along}
 
 
 def _thinned(posterior: Posterior, most: int) -> tuple[np.ndarray, np.ndarray]:

@@ -89,11 +89,7 @@ def save_run(
 
 
 def read_result(folder: Path) -> dict[str, Any]:
-    """result.json of a run, of one clip or several.
-
-    Raises:
-      InputError: not a folder that `fit` has finished, or the file is damaged.
-    """
+    """result.json of a run, of one clip or several."""
     if not (folder / RESULT).is_file():
         raise InputError(f"{folder}: no {RESULT}; a folder written by `galileo fit` expected")
     try:
@@ -115,20 +111,16 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
     for path in result.get("effects_from", []):
         load_file(path)
-    effects = make_effects(result["effects"])
-    motion = result.get("motion", "planar")
-    free = result.get("free", [])
     problem = make_problem(
         clip,
         observation,
         engine,
-        effects,
-        motion=motion,
-        free=free,
+        make_effects(result["effects"]),
+        motion=result.get("motion", "planar"),
+        free=result.get("free", []),
         trials_differ=TrialFriction.spread in posterior.names,
     )
     if (found := result.get("imperfections")) is not None:
-        problem = problem.with_sizes(
-            {name: entry["z"] for name, entry in found.items() if "z" in entry}
-        )
+        sizes = {name: entry["z"] for name, entry in found.items() if "z" in entry}
+        problem = problem.with_sizes(sizes)
     return Run(folder, clip, problem, posterior, result)

@@ -39,9 +39,7 @@ def number(value: float | None, sd: float | None, error: float = 0.0) -> str:
 def shown(entry: Mapping[str, Any], key: str = "mean") -> str:
     """A number of a parameter's entry in result.json, as text; all four to the same place.
 
-    Args:
-      entry: with `sd` and, if it was written since there is one, `mcse`.
-      key: "mean", "sd", "q025" or "q975".
+    `key`: "mean", "sd", "q025" or "q975". Entries of earlier versions have no `mcse`.
     """
     return number(entry[key], entry["sd"], max(entry.get("mcse", {"": 0.0}).values()))
 
@@ -66,9 +64,6 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
     The mass of a single object cancels out of its motion unless something in the model is a
     force or a force's constant (its unit has a kg or N in it). result.json keeps it all the same.
-
-    Returns:
-      entries by name, in the order of result.json.
     """
     entries = {**result["parameters"], **result.get("derived", {})}
     masses = [name for name in entries if MASS.fullmatch(name)]
@@ -81,8 +76,7 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 def headlines(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Frictions, ratios of masses and g; of a motion that has none of them what it determines.
 
-    Returns:
-      entries by name: those of `HEADLINES` in their alphabet, ratios last.
+    In the alphabet of their names, ratios last.
     """
     found = sorted(filter(HEADLINES.fullmatch, entries), key=lambda name: ("mass" in name, name))
     no_mass = (name for name in entries if not MASS.fullmatch(name) and name != "phi")

@@ -58,10 +58,10 @@ def measure_files(packed: Packed) -> MeasuredClip:
     Raises:
       InputError: something is wrong with it.
     """
-    from galileo_jax.api.explain import checked
+    from galileo_jax.api.explain import answered_clips
 
     with packed.unpacked() as here:
-        clip = checked(here.path, {})
+        (clip,), _ = answered_clips([here.path], {})
         warnings = tuple(map(here.text_of_origin, clip.warnings))
         named = {"path": here.origin(clip.path), "source": packed.source, "warnings": warnings}
         measured = measure(clip.model_copy(update=named))

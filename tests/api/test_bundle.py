@@ -13,7 +13,6 @@ import yaml
 import galileo_jax as gx
 from galileo_jax import __main__
 from galileo_jax.api import bundle as module
-from galileo_jax.api import explain as explain_module
 from galileo_jax.api.bundle import bundle_of_failure
 from galileo_jax.clip.load import check_clip, load_clip
 from galileo_jax.commands import command
@@ -143,7 +142,7 @@ def test_of_a_bug_there_is_the_track_and_the_traceback(board, tmp_path, monkeypa
         raise ZeroDivisionError(f"in {board.parent}/Anna.txt")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(explain_module, "explain", broken)
+    monkeypatch.setattr(gx, "explain", broken)
     with pytest.raises(ZeroDivisionError):
         command.run(__main__.main, [str(board), "--bundle", "--out", "Annas results"])
     texts = unpacked(tmp_path / "Annas results" / "bundle.zip", tmp_path / "unpacked")

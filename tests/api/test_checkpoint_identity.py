@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.api.effect_choice import chosen_effects
-from galileo_jax.api.fit import FitOptions, checkpoint_identity
+from galileo_jax.api.fit import FitOptions, checkpoint_identity, chosen_effects
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure

@@ -6,14 +6,13 @@ from dataclasses import MISSING, fields
 import pytest
 
 import galileo_jax as gx
-from galileo_jax.api.options import DiagnoseOptions, FitOptions, options_of
+from galileo_jax.api.options import FitOptions, options_of
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.sweeping.resources import Computing
 
 KINDS = {
     "fit": FitOptions,
-    "diagnose": DiagnoseOptions,
     "simulate": Settings,
     "label": Declaration,
     "sweep": Computing,
@@ -34,6 +33,5 @@ def test_a_call_without_options_has_the_defaults_of_the_options(verb, kind):
 
 
 def test_none_is_the_default_and_what_was_checked_goes_first():
-    given = {"add": None, "effects_from": ["a.py"], "engine": "c", "seed": 3, "more": 1}
-    found = options_of(DiagnoseOptions, given, effects_from=("a.py",))
-    assert found == DiagnoseOptions("auto", ("a.py",), "c", 3)
+    given = {one.name: None for one in fields(Computing)} | {"engine": "ray", "more": 1}
+    assert options_of(Computing, given, workers=3) == Computing("ray", workers=3)

@@ -35,5 +35,6 @@ def test_what_is_wrong_is_told_later(tmp_path):
 
     filmed = make_run(tmp_path, HIT, 1.6).clip.model_copy(update={"video": Path("clip.mp4")})
     asked = []
-    precompile.precompile([filmed], lambda *given: build(asked.append(given))).join()
+    with precompile.precompiling([filmed], lambda *given: build(asked.append(given))):
+        pass
     assert len(asked) == 1

@@ -6,8 +6,7 @@ import numpy as np
 
 from galileo_jax.api.explain import understood
 from galileo_jax.api.questions import answered
-from galileo_jax.api.seen_sentence import sentence_of
-from galileo_jax.api.understand import Understood
+from galileo_jax.api.understand import Understood, sentence_of
 from tests.studio.clips import clip_in, still_film
 
 SLOPE = "t (s);s\n" + "".join(f"{t:.2f};{0.4 * t**2:.4f}\n" for t in np.arange(30) / 25)

@@ -1,13 +1,11 @@
 """`galileo compare`: compare.json by contract, clips and runs, wrong calls in one line."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 from galileo_jax.commands import command, compare
 from galileo_jax.comparison.compare import comparison_document
-from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
 from tests.found import comparison_of, make_trials
 from tests.oracle_run import HIT, make_run
 from tests.precision import in_64_bit
@@ -55,38 +53,3 @@ def test_a_run_and_its_clip_say_the_same(run, tmp_path, capsys):
     assert of_clip["p_value"] == pytest.approx(of_run["p_value"], rel=0.2)
     assert told.startswith("The model is ")
     assert "object1" in told
-
-
-@pytest.mark.parametrize("broken", BROKEN_CLIPS[:3], ids=lambda broken: broken.id)
-def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
-    folder, out = tmp_path / "folder", tmp_path / "out"
-    folder.mkdir()
-    assert command.run(compare.main, [str(broken.build(folder)), "--out", str(out)]) == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert all(word in line for word in broken.words)
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["CLIP", "--effects", "nonsense"], "'nonsense'"),
-        (["CLIP", "--effects-from", "missing.py"], "missing.py: no such file"),
-        (["CLIP", "FOLDER"], "a run is compared alone"),
-        (["FOLDER"], "a folder written by `galileo fit` expected"),
-        (["FOLDER", "--effects", "air_drag"], "a run has its own effects"),
-        (["missing.yaml"], "missing.yaml"),
-        ([], "the following arguments are required"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd, monkeypatch):
-    clip = build_good_track(tmp_path)
-    (tmp_path / "folder").mkdir()
-    named = {"CLIP": str(clip), "FOLDER": str(tmp_path / "folder")}
-    call = [str(named.get(word, word)) for word in words]
-    monkeypatch.chdir(tmp_path)
-    assert command.run(compare.main, call) == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert said in line
-    assert not Path("runs").exists()

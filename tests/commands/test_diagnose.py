@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.results.run import load_run
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
-from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
+from tests.clip.broken_clips import build_good_track
 from tests.found import LAW, diagnosis_of, fit_of, make_trials
 from tests.oracle_run import HIT, make_run
 from tests.precision import in_64_bit
@@ -163,36 +162,6 @@ def test_ctrl_c_leaves_nothing_half_done(tmp_path, capfd, monkeypatch):
     assert command.run(diagnose.main, [str(clip), "--out", str(out)]) == 130
     assert "stopped" in capfd.readouterr().err
     assert not out.exists()
-
-
-@pytest.mark.parametrize("broken", BROKEN_CLIPS[:3], ids=lambda broken: broken.id)
-def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
-    folder, out = tmp_path / "folder", tmp_path / "out"
-    folder.mkdir()
-    assert command.run(diagnose.main, [str(broken.build(folder)), "--out", str(out)]) == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert all(word in line for word in broken.words)
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--add", "nonsense"], "known: auto, none, added_mass, air_drag"),
-        (["--effects-from", "missing.py"], "missing.py: no such file"),
-        (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
-        (["--seed", "-1"], "'-1' is not a whole number"),
-        (["--out", "clip.yaml"], "is a file; a folder expected"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd, monkeypatch):
-    clip = build_good_track(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    assert command.run(diagnose.main, [str(clip), *words]) == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert said in line
-    assert not Path("runs").exists()
 
 
 def test_a_damaged_truth_is_said(tmp_path, capfd):

@@ -18,11 +18,11 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
-from galileo_jax.commands.progress_display import ProgressDisplay
+from galileo_jax.commands.command import ProgressDisplay
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run
-from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
+from tests.clip.broken_clips import build_good_track
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 from tests.reference_ramp import solve
@@ -296,55 +296,6 @@ def test_the_thesis_preset_says_what_it_chose(simulated):
     assert result["preset"] == "thesis"
     assert set(result["best"]) == {"m1", "k1", "m2", "k2"}
     assert not result["converged"], "a point, and no posterior"
-
-
-@pytest.mark.parametrize("broken", BROKEN_CLIPS, ids=lambda broken: broken.id)
-def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
-    """Exit code 2, one line that names the file and the fault, nothing written."""
-    folder, out = tmp_path / "folder", tmp_path / "run"
-    folder.mkdir()
-    clip = broken.build(folder)
-    assert command.run(fit_command.main, [str(clip), "--out", str(out)]) == 2
-    shown = capfd.readouterr()
-    assert shown.out == ""
-    (line,) = shown.err.splitlines()
-    for word in broken.words:
-        assert word in line
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    "words, said",
-    [
-        (["--method", "foo"], "--method: invalid choice: 'foo'"),
-        (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
-        (["--pixels-per-metre", "-3"], "-3 is not a scale"),
-        (["--pixels-per-metre", "nan"], "nan is not finite"),
-        (["--pixels-per-metre", "x"], "invalid float value: 'x'"),
-        (["--method", "mh", "--max-steps", "7"], "7 is not a multiple of 25"),
-        (["--method", "mh", "--max-steps", "0"], "0 is not a multiple of 25"),
-        (["--seed", "-1"], "'-1' is not a whole number, 0 or more"),
-        (["--seed", "x"], "'x' is not a whole number"),
-        (["--preset", "foo"], "--preset: invalid choice: 'foo'"),
-        (["--effects", "nonsense"], "'nonsense'"),
-        (["--thing"], "unrecognized arguments: --thing"),
-        (["--sampler", "mixture"], "--sampler: of --method mh, not of grad"),
-        (["--method", "cnn", "--preset=thesis"], "--preset: of --method mh, not of cnn"),
-        (["--init", "cnn"], "--init: of --method mh, not of grad"),
-        (["--method", "mh", "--preset", "thesis", "--init", "cnn"], "--init: not of --preset th"),
-        (["--method", "mh", "--selection", "best"], "--selection: of --preset thesis only"),
-        (["--motion", "free", "--engine", "mjx"], "--engine mjx: it moves objects in a plane"),
-        (["--motion", "free", "--method", "cnn"], "--method cnn: the network knows motion in a"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd):
-    clip = build_good_track(tmp_path)
-    out = tmp_path / "run"
-    assert command.run(fit_command.main, [str(clip), "--out", str(out), *words]) == 2
-    (line,) = capfd.readouterr().err.splitlines()
-    assert said in line
-    assert not out.exists()
 
 
 def test_a_file_in_the_place_of_the_run(tmp_path, capfd):

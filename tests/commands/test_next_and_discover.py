@@ -3,8 +3,6 @@
 import json
 import types
 
-import pytest
-
 import galileo_jax as gx
 from galileo_jax import __main__
 from galileo_jax.commands import command
@@ -34,22 +32,6 @@ def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
     assert out.splitlines()[-1].startswith("release object 1 from 0.15 m")
     del asked["on_progress"]
     assert asked == {"found": [tmp_path], "can": "height=0.1:0.5", "about": "k2"}
-
-
-@pytest.mark.parametrize(
-    ("words", "line"),
-    [
-        (("next", "nowhere"), "nowhere: no result.json"),
-        (("next", "nowhere", "--can", "hight=1:2"), "--can: unknown setting 'hight'"),
-        (("discover", "nowhere"), "LAB: nowhere: no such program"),
-        (("discover", "nowhere", "--budget", "0"), "not a whole number, 1 or more"),
-    ],
-)
-def test_wrong_calls_are_one_line(words, line, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert galileo(*words) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and line in err and err.count("\n") == 1
 
 
 def test_a_damaged_diagnosis_is_one_line(tmp_path, capsys):

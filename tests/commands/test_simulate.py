@@ -8,8 +8,6 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command
-from galileo_jax.commands import simulate as simulate_command
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.truth import SLOWEST_HIT_M_S, Truth, draw_truth
 from tests.reference_ramp import Experiment, Solution, solve
@@ -162,52 +160,3 @@ def test_free_motion_of_what_meets_squarely_is_planar():
     tipped = np.abs(free.pitch_rad[:, :count] - planar.pitch_rad)
     assert tipped.max() < FREE_TIPPED_RAD
     assert tipped[:, -1].max() < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("call", "complaint"),
-    [
-        ([], "--out"),
-        (["--out", "clip.avi"], "clip.avi does not end in .mp4"),
-        (["--out", "clip.mp4", "--track-only"], "clip.mp4 does not end in .csv"),
-        (["--out", "clip.mp4", "--angle", "95"], "'95' is not a number in [1, 60]"),
-        (["--out", "clip.mp4", "--m1", "0"], "'0' is not a number in [0.01, 100]"),
-        (["--out", "clip.mp4", "--k1", "nan"], "'nan' is not a number"),
-        (["--out", "clip.mp4", "--seed", "-1"], "'-1' is not a whole number at least 0"),
-        (["--out", "clip.mp4", "--size", "640"], "'640' is not a size"),
-        (["--out", "clip.mp4", "--size", "641x360"], "even numbers"),
-        (["--out", "clip.mp4", "--scenario", "rmap"], "rmap"),
-        (
-            ["--out", "clip.mp4", "--effect", "drag"],
-            "unknown effect 'drag'; known: added_mass",
-        ),
-        (["--out", "clip.mp4", "--effect", "air_drag:c=1"], "no parameter 'c'; known: air_drag"),
-        (["--out", "clip.mp4", "--effect", "air_drag:air_drag=x"], "is not PARAMETER=NUMBER"),
-        (["--out", "clip.mp4", "--effect", "rolling", "--effect", "rolling"], "named twice"),
-        (["--out", "clip.mp4", "--effect", "x", "--effects-from", "none.py"], "none.py"),
-        (["--out", "clip.mp4", "--effects-from", "none.py"], "--effects-from: nothing of it is"),
-        (["--out", "c.csv", "--track-only", "--camera-fault", "roll"], "has no camera"),
-        (["--out", "/proc/none/clip.mp4"], "/proc/none/clip.mp4"),
-        (["--out", "clip.mp4", "--strength", "1"], "--strength: of what? name an effect"),
-        (["--out", "clip.mp4", "--track-noise", "0.001"], "--track-noise: of a track only"),
-        (["--out", "clip.mp4", "--floor"], "--floor: not of a ramp"),
-        (["--out", "clip.mp4", "--scenario", "flight", "--angle=20"], "--angle: of a ramp only"),
-        (["--out", "clip.mp4", "--scenario", "fall", "--hand"], "--hand: of a ramp only"),
-        (["--out", "clip.mp4", "--scenario", "incline", "--k2", "0.1"], "--k2: an incline has one"),
-        (["--out", "c.csv", "--track-only", "--size", "640x360"], "--size: a track (--track-only)"),
-        (["--out", "c.mp4", "--motion", "free"], "in a plane only; add --track-only"),
-        (["--out", "c.csv", "--track-only", "--z2", "0.01"], "--z2: of --motion free only"),
-        (["--out", "c.csv", *FREE, "--z2", "0.6"], "'0.6' is not a number in [-0.5, 0.5]"),
-        (["--out", "c.csv", *FREE, "--solver", "fine"], "--solver fine: of --motion planar only"),
-        (["--out", "c.csv", *FREE, "--scenario", "fall"], "not of scenario fall"),
-        (["--out", "c.csv", *FREE, "--shapes", "box,sphere"], "nothing may roll"),
-    ],
-)
-def test_wrong_calls_are_one_line_and_leave_nothing(call, complaint, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert command.run(simulate_command.main, call) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    assert complaint in err
-    assert list(tmp_path.iterdir()) == []

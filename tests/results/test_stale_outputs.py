@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from galileo_jax.api.fit_result import make_fit
+from galileo_jax.api.fit_result import Found, make_fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
@@ -41,17 +41,9 @@ def fit_again(run: Run, names: tuple[str, ...]) -> None:
     trials = JointProblem(tuple(replace(run.problem, name=name) for name in names))
     z = 0.1 * np.random.default_rng(0).standard_normal((8, len(trials.parameters)))
     posterior = Posterior(trials.names, trials.theta(z)[None], np.zeros((1, 8)), Status.CONVERGED)
-    made = make_fit(
-        tuple(Measurement(clip, seen, seen) for clip in clips),
-        trials,
-        posterior,
-        z[0],
-        None,
-        method="grad",
-        seed=0,
-        timings={},
-        notes={"status": "the fit converged"},
-    )
+    found = Found(trials, posterior, z[0], {"status": "the fit converged"})
+    measured = [Measurement(clip, seen, seen) for clip in clips]
+    made = make_fit(measured, found, method="grad", seed=0, timings={})
     made.save(run.folder, report=False)
 
 
