@@ -31,7 +31,7 @@ from galileo_jax.model.effects.effect import Effect
 from galileo_jax.rollout.engine_jax import RECORDS
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.batching import FRAMES, rounded_up
-from galileo_jax.similarity.gaussian_likelihood import Whitening, log_density_by_modes
+from galileo_jax.similarity.gaussian_likelihood import log_density_by_modes
 
 # Of the draws of sizes: more of few measured values, whose squared number is what each costs.
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
@@ -72,29 +72,19 @@ class LogPosterior:
         for c, (clip, each) in enumerate(zip(self._residuals.clips, self._data, strict=True)):
             self._residuals.num_rollouts += len(z)
             predicted = clip.problem.simulate_batch(clip.theta(z[:, :count], free))
-            left = _in_stated_errors(predicted, each[0])
-            found += [_log_likelihood(left, noise[:, c], data) for data in each]
+            one = each[0]  # of residuals in the stated errors, which no size changes
+            with np.errstate(over="ignore", invalid="ignore"):
+                off = one.observed_m - predicted
+                left = np.einsum("oijt,pojt->poit", one.inverse_root, off).reshape(len(z), -1)
+                left2 = np.sum(left**2, axis=1)
+                for of_size, data in zip(found, each, strict=True):
+                    along2 = (left @ data.rows.T) ** 2
+                    of_size += log_density_by_modes(
+                        left2, along2, noise[:, c], data.gain, data.num_values
+                    )
         mean = np.asarray(logsumexp(found - self._of_sizes[:, None], axis=0)) - np.log(len(found))
         mean = np.nan_to_num(mean, nan=IMPOSSIBLE, neginf=IMPOSSIBLE)
         return mean - 0.5 * np.sum(z**2, axis=1) + self._of_prior
-
-
-def _in_stated_errors(predicted_m: np.ndarray, data: Whitening) -> Float[np.ndarray, "point value"]:
-    """Residuals in units of the stated errors, which no size changes."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        left = np.einsum("oijt,pojt->poit", data.inverse_root, data.observed_m - predicted_m)
-    return left.reshape(len(left), -1)
-
-
-def _log_likelihood(
-    left: Float[np.ndarray, "point value"], noise: Float[np.ndarray, " point"], data: Whitening
-) -> Float[np.ndarray, " point"]:
-    """Of what was measured, up to the constant of the tracker's own covariance."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        along2 = (left @ data.rows.T) ** 2
-        return log_density_by_modes(
-            np.sum(left**2, axis=1), along2, noise, data.gain, data.num_values
-        )
 
 
 class Rolled(NamedTuple):
@@ -140,24 +130,14 @@ def density_of(
 
 def _rolled(problem: Problem) -> Rolled:
     model, engine = problem.model, problem.engine
-    if hasattr(engine, "roll_out"):
-        roll_out, count = engine.roll_out, rounded_up(model.num_records + 1, RECORDS)  # pyright: ignore
-    else:
-        roll_out, count = _called_back(problem), model.num_records + 1
-    return Rolled(
-        roll_out, model.effects + model.nuisances, model.names, count, Kind(*problem.kind)
-    )
 
+    def called_back(effects: Any, names: Any, count: Any, dt: Any, theta: jax.Array, scene: Any):
+        return tuple(values[0] for values in in_jax(engine)(theta[None]))
 
-def _called_back(problem: Problem) -> Callable[..., Any]:
-    """An engine outside JAX with the arguments of one in it."""
-
-    def roll_out(
-        effects: Any, names: Any, count: Any, dt: Any, theta: jax.Array, scene: Any
-    ) -> Any:
-        return tuple(values[0] for values in in_jax(problem.engine)(theta[None]))
-
-    return roll_out
+    effects, count = model.effects + model.nuisances, model.num_records + 1
+    roll_out = getattr(engine, "roll_out", None)
+    long = count if roll_out is None else rounded_up(count, RECORDS)
+    return Rolled(roll_out or called_back, effects, model.names, long, Kind(*problem.kind))
 
 
 def log_density(
@@ -196,8 +176,10 @@ def _of_clip(how: Rolled, part: Part, z: jax.Array, noise: jax.Array) -> jax.Arr
 
 def _covariances(clip: FittedClip, draws: list[Sizes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Basis, turned and gain of a `Part`, padded as the clip is."""
-    whole = clip.problem.with_sizes(_largest(draws)).data
-    basis = whole.basis.reshape(len(whole.gain), -1)
+    named = [sizes for sizes in draws if sizes is not None]
+    largest = {name: max(own[name] for own in named) for name in named[0]} if named else None
+    whole = clip.problem.with_sizes(largest).data
+    basis = whole.rows
     count = max(rounded_up(len(basis), FRAMES), len(clip.whitening.gain))
     turned, gain = np.zeros((len(draws), count, count)), np.zeros((len(draws), count))
     for k, sizes in enumerate(draws):
@@ -208,9 +190,3 @@ def _covariances(clip: FittedClip, draws: list[Sizes]) -> tuple[np.ndarray, np.n
     frames = clip.whitening.observed_m.shape[-1] - whole.basis.shape[-1]
     padded = np.pad(whole.basis, [(0, count - len(basis)), (0, 0), (0, 0), (0, frames)])
     return padded.reshape(count, -1), turned, gain
-
-
-def _largest(draws: list[Sizes]) -> Sizes:
-    """Of each imperfection the largest of its sizes."""
-    named = [sizes for sizes in draws if sizes is not None]
-    return {name: max(own[name] for own in named) for name in named[0]} if named else None

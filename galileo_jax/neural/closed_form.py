@@ -225,10 +225,6 @@ def _combine(one: Estimate, other: Estimate) -> Estimate:
     return Estimate((weight * one.value + against * other.value) / total, 1 / jnp.sqrt(total))
 
 
-def _first(mask: jax.Array) -> jax.Array:
-    return jnp.where(mask.any(), jnp.argmax(mask), mask.shape[0])
-
-
 def _at_end(x: jax.Array, mask: jax.Array, noise: jax.Array) -> tuple[jax.Array, jax.Array]:
     """The mean place of the last frames that stay in one, and how many they are."""
     last = x.shape[0] - 1 - jnp.argmax(mask[::-1])
@@ -263,7 +259,7 @@ def _onset(seen: Seen, setting: Setting) -> Onset:
         jnp.minimum(mask.sum(), 5), 1
     )
     gone = mask & (jnp.abs(x2 - begin) > setting.moved_m[1])
-    first = _first(gone)
+    first = jnp.where(gone.any(), jnp.argmax(gone), len(x2))
     is_hit = gone.sum() >= 3
     hit_frame = jnp.where(is_hit, first, len(x2))
     return Onset(begin, gone, first, is_hit, hit_frame, setting.frame < hit_frame - 1)

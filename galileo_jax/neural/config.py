@@ -13,11 +13,6 @@ Share = Annotated[float, Field(gt=0, lt=1)]
 Count = Annotated[int, Field(gt=0)]
 
 
-def _known(preset: str) -> str:
-    PRESETS.get(preset)
-    return preset
-
-
 class TrainConfig(BaseModel):
     """Everything that decides what is learned.
 
@@ -38,7 +33,7 @@ class TrainConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preset: Annotated[str, AfterValidator(_known)]
+    preset: Annotated[str, AfterValidator(lambda name: PRESETS.get(name) and name)]
     seed: Annotated[int, Field(ge=0)] = 0
     samples: Annotated[int, Field(ge=100)]
     validation_share: Share = 0.1

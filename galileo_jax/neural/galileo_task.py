@@ -111,11 +111,7 @@ def to_sample(seen: Seen, truth: Truth) -> dict[str, jax.Array]:
     }
 
 
-def _sample(key: jax.Array) -> dict[str, jax.Array]:
-    return to_sample(*draw(key))
-
-
-_samples = jax.jit(jax.vmap(_sample))
+_samples = jax.jit(jax.vmap(lambda key: to_sample(*draw(key))))
 
 
 def _standardise(network: PosteriorNetwork, features: np.ndarray) -> None:

@@ -61,7 +61,13 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     costs = fitter.search_costs(tried[:, : len(free)], np.tile(free, (len(tried), 1)))
     best = np.argmin(costs.reshape(num_chains, -1), axis=1)
     z = tried.reshape(num_chains, NUM_COMPLETIONS, -1)[np.arange(num_chains), best]
-    return Start(fit, z, {"init": "cnn"} | _warnings(notes))
+    told: dict[str, Any] = {"init": "cnn"}
+    if "warnings" in notes:
+        told["warnings"] = [
+            "--init cnn: this clip is unlike those that the network was trained on; compare with "
+            "--init grad"
+        ]
+    return Start(fit, z, told)
 
 
 def completed(
@@ -78,15 +84,3 @@ def completed(
     whole = z.copy()
     whole[:, rest] = fit.z[rest] + (z - fit.z)[:, known] @ slope + noise
     return whole
-
-
-def _warnings(notes: dict[str, Any]) -> dict[str, Any]:
-    """The network's, in so far as they concern a start."""
-    if "warnings" not in notes:
-        return {}
-    return {
-        "warnings": [
-            "--init cnn: this clip is unlike those that the network was trained on; compare with "
-            "--init grad"
-        ]
-    }

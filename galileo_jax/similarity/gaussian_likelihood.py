@@ -148,7 +148,7 @@ def inverse_root_of(observation: Observation) -> Float[np.ndarray, "object axis 
     is_line = (across != 0).any(axis=1)
     line = np.stack([-across[:, 1], across[:, 0]], axis=-1)[is_line]
     inverse_root[is_line] = 0.0
-    inverse_root[is_line, 0] = line / np.sqrt(observation.variance_m2[is_line])[:, None]
+    inverse_root[is_line, 0, :2] = line / np.sqrt(observation.variance_m2[is_line])[:, None]
     return np.moveaxis(inverse_root, 1, -1)
 
 

@@ -66,8 +66,12 @@ def fitted_mode_size(
     errors = np.zeros((len(gain2), len(gain2))) if errors is None else errors
     white = data.rows @ white
     amplitude = white * np.sqrt(noise_scale**2 + gain2)
-    covers = (mode_covariance(noise_scale, size, data, errors) for size in MODE_SIZES)
-    return float(MODE_SIZES[np.argmax([_log_normal(amplitude, cover) for cover in covers])])
+    found = []
+    for size in MODE_SIZES:
+        root = np.linalg.cholesky(mode_covariance(noise_scale, size, data, errors))
+        left = np.linalg.solve(root, amplitude)
+        found.append(-0.5 * left @ left - np.log(np.diag(root)).sum())
+    return float(MODE_SIZES[np.argmax(found)])
 
 
 def mode_covariance(
@@ -76,12 +80,6 @@ def mode_covariance(
     """Of what is seen along the modes: noise, imperfections of another size, and errors in full."""
     imperfect = np.diag(data.gain**2) - errors
     return noise_scale**2 * np.eye(len(errors)) + mode_size**2 * imperfect + errors
-
-
-def _log_normal(values: np.ndarray, covariance: np.ndarray) -> float:
-    root = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(root, values)
-    return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
 
 
 def errors_at(

@@ -106,7 +106,10 @@ def linear_clips(trials: JointProblem, fit: GradientFit) -> list[LinearClip]:
         first += size
         white = problem.whiten(problem.simulate(trials.of_clip(theta, index)), scale)
         every = np.column_stack([white - rows @ fit.z[:count], rows])
-        every = averaged(_in_stated_errors(every, scale, problem).T, problem)
+        # From whitened to units of the stated errors.
+        gain = np.sqrt(scale**2 + problem.data.gain**2) - scale
+        along = gain[:, None] * (problem.data.rows @ every)
+        every = averaged((scale * every + problem.data.rows.T @ along).T, problem)
         modes = averaged(problem.fixed_patterns, problem)
         of_terms = {}
         for term, patterns in problem.patterns.items():
@@ -133,15 +136,6 @@ def averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row val
     starts = np.flatnonzero((rank % together == 0) | (np.diff(own, prepend=-1) > 0))
     number = np.diff(starts, append=len(own))
     return np.add.reduceat(values, starts, axis=1) / np.sqrt(number)
-
-
-def _in_stated_errors(white: np.ndarray, scale: float, problem: Problem) -> np.ndarray:
-    """Columns of whitened residuals in units of the stated tracking errors."""
-    data = problem.data
-    basis = data.rows
-    along = basis @ white
-    more = np.sqrt(scale**2 + data.gain**2) - scale
-    return scale * white + basis.T @ (more[:, None] * along)
 
 
 def most_probable(

@@ -232,13 +232,9 @@ def _run_block(
         return (states, sampler), (trace.position, trace.log_density, info.is_accepted)
 
     (states, sampler), record = jax.lax.scan(body, (states, sampler), (turns, gains))
-    return states, sampler, tuple(_of_chains(leaf) for leaf in record)
-
-
-def _of_chains(leaf: jax.Array) -> jax.Array:
-    """`[turn, chain, step of the turn, ...]` to `[chain, step, ...]`."""
-    leaf = jnp.moveaxis(leaf, 0, 1)
-    return leaf.reshape(leaf.shape[0], -1, *leaf.shape[3:])
+    # From [turn, chain, step of the turn, ...] to [chain, step, ...].
+    by_chain = (jnp.moveaxis(leaf, 0, 1) for leaf in record)
+    return states, sampler, tuple(v.reshape(len(v), -1, *v.shape[3:]) for v in by_chain)
 
 
 def _refitted(sampler: TunedSampler, history: History) -> TunedSampler:

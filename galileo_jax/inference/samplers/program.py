@@ -51,6 +51,4 @@ def _leaves_of(function, code, kinds, arrays, args):
     return tuple(jax.tree.leaves(function(Program(code, arrays), *args)))
 
 
-@eqx.filter_jit
-def _jitted(function, log_density, *args):
-    return function(log_density, *args)
+_jitted = eqx.filter_jit(lambda function, log_density, *args: function(log_density, *args))
