@@ -10,23 +10,23 @@ from galileo_jax.diagnosis.laws import fit_formulas, rank_formulas
 from galileo_jax.diagnosis.laws.fit_formulas import fitted_laws
 from galileo_jax.diagnosis.laws.grammar import Structure
 from galileo_jax.diagnosis.laws.rank_formulas import NUM_OF_FAMILY, of_family
-from tests.diagnosis.test_rank_formulas import FACTOR, RANGES, TIMES, made, sight
+from tests.diagnosis.test_rank_formulas import FACTOR, RANGES, TIMES, clip_that_lacks, made
 
 
 @pytest.fixture
-def sights(monkeypatch) -> Any:
+def clips(monkeypatch) -> Any:
     """One clip in which object 1 is pushed on over a bump."""
     away = (TIMES - 0.5) / 0.1
-    seen = sight(3.0 * away * np.exp(-(away**2)))
-    monkeypatch.setattr(rank_formulas, "ranges_of", lambda sights: RANGES)
+    seen = clip_that_lacks(3.0 * away * np.exp(-(away**2)))
+    monkeypatch.setattr(rank_formulas, "ranges_of", lambda clips: RANGES)
     scene: Any = seen.view.model.scene.surroundings
     scene.has_surface, scene.names = True, ("object1", "object2")
     return [seen]
 
 
-def test_a_family_has_more_ways_than_are_screened(sights):
+def test_a_family_has_more_ways_than_are_screened(clips):
     family = Structure("push", False, (FACTOR["slope_q"],)).family
-    found = of_family(sights, family)
+    found = of_family(clips, family)
     ways = {(one.structure.nature, one.structure.is_on_all) for one in found}
     assert {("push", False), ("friction", False)} <= ways and len(ways) > NUM_OF_FAMILY
     assert {one.structure.family for one in found} == {family}
@@ -39,7 +39,7 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
     family = [made("slope_q", 90.0 - i, *way) for i, way in enumerate(ways)]
     evidence = {"push": 285.0, "friction": 275.0}
 
-    def fitted(trials, near, found, sights):
+    def fitted(trials, near, found, clips):
         return [
             SimpleNamespace(
                 structure=one.structure,
@@ -51,8 +51,8 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
             for one in found
         ]
 
-    monkeypatch.setattr(fit_formulas, "suggestions", lambda sights, wanted: family[:2])
-    monkeypatch.setattr(fit_formulas, "of_family", lambda sights, name: family)
+    monkeypatch.setattr(fit_formulas, "suggestions", lambda clips, wanted: family[:2])
+    monkeypatch.setattr(fit_formulas, "of_family", lambda clips, name: family)
     monkeypatch.setattr(fit_formulas, "_fitted", fitted)
     monkeypatch.setattr(fit_formulas, "without_twins", lambda laws: laws)
     none: Any = None

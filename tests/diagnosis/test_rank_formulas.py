@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
-from galileo_jax.diagnosis.laws.linearised_clip import Sight
+from galileo_jax.diagnosis.laws.linearised_clip import LinearisedClip
 from galileo_jax.diagnosis.laws.rank_formulas import (
     BEHIND,
     NUM_LAWS,
@@ -22,7 +22,9 @@ RANGES = {"t": (0.0, 1.0), "q": (-0.5, 0.5)}
 TIMES = np.linspace(0.0, 1.0, 120)
 
 
-def sight(missing_m_s2: np.ndarray, k: float = 0.2, per_m: float = 3000.0) -> Sight:
+def clip_that_lacks(
+    missing_m_s2: np.ndarray, k: float = 0.2, per_m: float = 3000.0
+) -> LinearisedClip:
     """One object on a table that lacks an acceleration; places are known to 1/`per_m`."""
     step = TIMES[1]
     places = np.tril(np.subtract.outer(TIMES, TIMES)) * step * per_m
@@ -36,7 +38,7 @@ def sight(missing_m_s2: np.ndarray, k: float = 0.2, per_m: float = 3000.0) -> Si
             scene=SimpleNamespace(surroundings=SimpleNamespace(gravity=9.81, angle_rad=0.0))
         ),
     )
-    return Sight(view, places @ missing_m_s2, (places,), np.ones(1), np.array([k]))
+    return LinearisedClip(view, places @ missing_m_s2, (places,), np.ones(1), np.array([k]))
 
 
 def made(label: str, score: float, nature: Any = "push", is_on_all: bool = False) -> Suggestion:
@@ -46,7 +48,9 @@ def made(label: str, score: float, nature: Any = "push", is_on_all: bool = False
 
 def test_constants_between_the_points_of_the_grid_are_found():
     gust = 3.0 * np.exp(-(((TIMES - 0.407) / 0.057) ** 2))
-    found = suggestion_of([sight(gust)], Structure("push", False, (FACTOR["pulse_t"],)), RANGES)
+    found = suggestion_of(
+        [clip_that_lacks(gust)], Structure("push", False, (FACTOR["pulse_t"],)), RANGES
+    )
     assert found is not None
     start = dict(found.starts[0])
     assert start.pop("c") == pytest.approx(3.0, rel=0.01)
@@ -54,7 +58,9 @@ def test_constants_between_the_points_of_the_grid_are_found():
 
 
 def test_starts_are_apart():
-    found = suggestion_of([sight(TIMES**2)], Structure("push", False, (FACTOR["power_t"],)), RANGES)
+    found = suggestion_of(
+        [clip_that_lacks(TIMES**2)], Structure("push", False, (FACTOR["power_t"],)), RANGES
+    )
     assert found is not None
     powers = [start["p"] for start in found.starts]
     assert powers[0] == pytest.approx(2.0, abs=0.02)
@@ -64,7 +70,9 @@ def test_starts_are_apart():
 def test_a_wave_starts_at_several_lengths():
     """And not at one length with opposite phases, which is one formula twice."""
     wave = np.sin(6.283 * (TIMES - 0.5) / 0.2 + 1.0) + 0.8 * np.sin(6.283 * (TIMES - 0.5) / 0.29)
-    found = suggestion_of([sight(wave)], Structure("push", False, (FACTOR["wave_q"],)), RANGES)
+    found = suggestion_of(
+        [clip_that_lacks(wave)], Structure("push", False, (FACTOR["wave_q"],)), RANGES
+    )
     assert found is not None
     lengths = [start["length"] for start in found.starts]
     assert min(abs(length - 0.2) for length in lengths) < 0.02
@@ -76,7 +84,7 @@ def test_a_wave_starts_at_several_lengths():
 def test_no_friction_becomes_negative(k, change):
     push = 6.0 * np.exp(-(((TIMES - 0.4) / 0.06) ** 2))
     structure = Structure("friction", False, (FACTOR["pulse_t"],))
-    found = suggestion_of([sight(push, k)], structure, RANGES)
+    found = suggestion_of([clip_that_lacks(push, k)], structure, RANGES)
     assert found is not None
     assert found.starts[0]["c"] == pytest.approx(change, abs=0.02)
 
@@ -84,7 +92,7 @@ def test_no_friction_becomes_negative(k, change):
 @pytest.mark.parametrize(("forward_m_s2", "is_drag"), [(-2.0, True), (2.0, False)])
 def test_what_drives_is_no_drag(forward_m_s2, is_drag):
     """A drag takes energy; a push may have either sign."""
-    seen = [sight(forward_m_s2 * np.exp(-TIMES / 0.3))]
+    seen = [clip_that_lacks(forward_m_s2 * np.exp(-TIMES / 0.3))]
     pair = (FACTOR["decay_t"], FACTOR["power_v"])
     drag = suggestion_of(seen, Structure("drag", False, pair), RANGES)
     push = suggestion_of(seen, Structure("push", False, pair[:1]), RANGES)

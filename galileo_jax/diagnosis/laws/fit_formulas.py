@@ -16,7 +16,7 @@ from galileo_jax.diagnosis.laws.grammar import (
     name_of,
     without_one_factor,
 )
-from galileo_jax.diagnosis.laws.linearised_clip import Sight
+from galileo_jax.diagnosis.laws.linearised_clip import LinearisedClip
 from galileo_jax.diagnosis.laws.rank_formulas import (
     NUM_LAWS,
     Shape,
@@ -102,16 +102,16 @@ def fitted_laws(
     `near` has no effects, all else from where fits start; `wanted` is tried whatever the screening
     says of it.
     """
-    sights = [Sight.of(view) for view in views]
-    found = suggestions(sights, wanted)
+    clips = [LinearisedClip.of(view) for view in views]
+    found = suggestions(clips, wanted)
     on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
-    made = _fitted(trials, near, found, sights)
+    made = _fitted(trials, near, found, clips)
     known = {name_of(law.structure) for law in made}
     if made:
-        others = [*_simpler(made[0]), *of_family(sights, made[0].structure.family)]
+        others = [*_simpler(made[0]), *of_family(clips, made[0].structure.family)]
         new = [one for one in others if name_of(one.structure) not in known]
         on_stage(f"looking for a law: fitting the best formula in {len(new[:NUM_LAWS])} other ways")
-        made += _fitted(trials, near, new[:NUM_LAWS], sights)
+        made += _fitted(trials, near, new[:NUM_LAWS], clips)
     return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
 
 
@@ -155,12 +155,12 @@ def _fitted(
     trials: JointProblem,
     near: Hypothesis,
     found: Sequence[Suggestion],
-    sights: Sequence[Sight],
+    clips: Sequence[LinearisedClip],
 ) -> list[FittedLaw]:
     """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
         return []
-    ranges = ranges_of(sights)
+    ranges = ranges_of(clips)
     sources = [class_source(one.structure, ranges) for one in found]
     extended = _with_laws(trials, [one.structure for one in found], sources)
     fitter, count = GradientFitter(extended), len(extended.model_parameters)
@@ -172,7 +172,7 @@ def _fitted(
     starts, free, owner = [], [], []
     for i, one in enumerate(found):
         is_free = extended.free([name_of(one.structure)])[:count]
-        for start in _starts(extended, z, one, sights):
+        for start in _starts(extended, z, one, clips):
             starts.append(np.where(is_free, start[:count], 0.0))
             free.append(is_free)
             owner.append(i)
@@ -209,12 +209,12 @@ def _with_laws(
 
 
 def _starts(
-    extended: JointProblem, z: np.ndarray, one: Suggestion, sights: Sequence[Sight]
+    extended: JointProblem, z: np.ndarray, one: Suggestion, clips: Sequence[LinearisedClip]
 ) -> list[np.ndarray]:
     """Starts in z: constants of the screening; all else as given, or as goes with it."""
     name, found = name_of(one.structure), []
     for constants in one.starts:
-        for others in (z, _with_formula(extended, z, one.structure, constants, sights)):
+        for others in (z, _with_formula(extended, z, one.structure, constants, clips)):
             start, values = others.copy(), dict(constants)
             if one.structure.nature == "friction":
                 theta = dict(zip(extended.names, extended.theta(start), strict=True))
@@ -233,23 +233,23 @@ def _with_formula(
     z: np.ndarray,
     structure: Structure,
     constants: Mapping[str, float],
-    sights: Sequence[Sight],
+    clips: Sequence[LinearisedClip],
 ) -> np.ndarray:
     """All else where a linear model has it if the formula is there."""
     total, count = np.zeros(len(z)), np.zeros(len(z))
-    for clip, sight in enumerate(sights):
-        view = sight.view
+    for index, clip in enumerate(clips):
+        view = clip.view
         others = view.others()
         grid = {key: np.array([constants[key]]) for key in structure.constants}
-        curves = sight.accelerations(structure, grid)
+        curves = clip.accelerations(structure, grid)
         left = view.target()
         for i, (curve,) in enumerate(curves):
             left = left - view.shows(i)[:, view.moves[i]] @ (constants["c"] * curve[view.moves[i]])
         design = view.fit.jacobian[:, others]
         normal = design.T @ design + np.eye(len(others))
         solved = -np.linalg.solve(normal, design.T @ left)
-        columns = extended.columns[clip]
-        names = extended.problems[clip].model.names
+        columns = extended.columns[index]
+        names = extended.problems[index].model.names
         for at, value in zip(others, solved, strict=True):
             own = view.model.names[at]
             if own in names:

@@ -13,7 +13,7 @@ LEAST_FRICTION = -0.05  # that a coefficient may come to, beyond minus itself: i
 
 
 @dataclass(frozen=True)
-class Sight:
+class LinearisedClip:
     """One clip's target and responses, all else made part of the noise.
 
     Attributes:
@@ -31,7 +31,7 @@ class Sight:
     frictions: np.ndarray
 
     @classmethod
-    def of(cls, view: View) -> "Sight":
+    def of(cls, view: View) -> "LinearisedClip":
         """From a view."""
         target = view.target()
         rest = view.fit.jacobian[:, view.others()]

@@ -20,7 +20,7 @@ from math import log
 import numpy as np
 
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
-from galileo_jax.diagnosis.laws.linearised_clip import Sight
+from galileo_jax.diagnosis.laws.linearised_clip import LinearisedClip
 from galileo_jax.diagnosis.thresholds import LENGTH_ODDS
 
 NUM_LAWS, NUM_OF_FAMILY, NUM_STARTS = 8, 2, 3
@@ -53,25 +53,27 @@ class Suggestion:
     score: float
 
 
-def suggestions(sights: Sequence[Sight], wanted: Collection[Shape] = ()) -> list[Suggestion]:
+def suggestions(
+    clips: Sequence[LinearisedClip], wanted: Collection[Shape] = ()
+) -> list[Suggestion]:
     """The formulas that promise most, best first."""
-    return chosen(_suggested(sights), wanted)
+    return chosen(_suggested(clips), wanted)
 
 
-def of_family(sights: Sequence[Sight], family: str) -> list[Suggestion]:
+def of_family(clips: Sequence[LinearisedClip], family: str) -> list[Suggestion]:
     """Every formula of a family, whatever it acts by and on whom, best first."""
-    return sorted(_suggested(sights, family), key=lambda one: -one.score)
+    return sorted(_suggested(clips, family), key=lambda one: -one.score)
 
 
-def _suggested(sights: Sequence[Sight], family: str | None = None) -> list[Suggestion]:
+def _suggested(clips: Sequence[LinearisedClip], family: str | None = None) -> list[Suggestion]:
     """All formulas that show, or those of one family."""
-    scene = sights[0].view.model.scene.surroundings
-    ranges = ranges_of(sights)
+    scene = clips[0].view.model.scene.surroundings
+    ranges = ranges_of(clips)
     return [
         one
         for structure in structures(scene.has_surface, len(scene.names))
         if family in (None, structure.family)
-        and (one := suggestion_of(sights, structure, ranges)) is not None
+        and (one := suggestion_of(clips, structure, ranges)) is not None
     ]
 
 
@@ -117,9 +119,9 @@ def _best_of(found: Sequence[Suggestion], shape: Shape) -> list[Suggestion]:
     return sorted(alike, key=lambda one: one.structure.is_on_all != is_on_all)[:1]
 
 
-def ranges_of(sights: Sequence[Sight]) -> dict[str, tuple[float, float]]:
+def ranges_of(clips: Sequence[LinearisedClip]) -> dict[str, tuple[float, float]]:
     """What of time and place is seen in motion."""
-    views = [sight.view for sight in sights]
+    views = [clip.view for clip in clips]
     times = np.concatenate([view.time_s[view.moves.any(axis=0)] for view in views])
     places = np.concatenate([view.path_m[view.moves] for view in views])
     if not places.size:
@@ -144,11 +146,11 @@ def _grid(structure: Structure, ranges: Mapping[str, tuple[float, float]]) -> di
 
 
 def suggestion_of(
-    sights: Sequence[Sight], structure: Structure, ranges: Mapping[str, tuple[float, float]]
+    clips: Sequence[LinearisedClip], structure: Structure, ranges: Mapping[str, tuple[float, float]]
 ) -> Suggestion | None:
     """The best constants of a formula; None where it does not show."""
     grid = _grid(structure, ranges)
-    gain, strength = _gains(sights, structure, grid)
+    gain, strength = _gains(clips, structure, grid)
     if not gain.size:
         return None
     columns = grid | {"c": strength}
@@ -156,14 +158,14 @@ def suggestion_of(
     starts = [{name: float(values[i]) for name, values in columns.items()} for i in best]
     highest = float(gain[best[0]])
     if grid:
-        better = _refined(sights, structure, grid, starts[0])
-        gain, strength = _gains(sights, structure, {k: np.array([v]) for k, v in better.items()})
+        better = _refined(clips, structure, grid, starts[0])
+        gain, strength = _gains(clips, structure, {k: np.array([v]) for k, v in better.items()})
         if gain.size and gain[0] > highest:
             starts[0], highest = better | {"c": float(strength[0])}, float(gain[0])
     numbers = 1 + len(structure.constants)
     if structure.nature == "friction":  # the strength times each object's own coefficient
-        numbers += (len(sights[0].responses) - 1) * structure.is_on_all
-    price = 0.5 * numbers * log(sum(np.count_nonzero(sight.target) for sight in sights))
+        numbers += (len(clips[0].responses) - 1) * structure.is_on_all
+    price = 0.5 * numbers * log(sum(np.count_nonzero(clip.target) for clip in clips))
     price -= log(LENGTH_ODDS) * (len(structure.factors) - 1)
     return Suggestion(structure, tuple(starts), highest - price)
 
@@ -203,16 +205,16 @@ def _hilltops(gain: np.ndarray, along: np.ndarray) -> list[int]:
 
 
 def _gains(
-    sights: Sequence[Sight], structure: Structure, grid: Mapping[str, np.ndarray]
+    clips: Sequence[LinearisedClip], structure: Structure, grid: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Half of what chi2 falls by, and the first object's strength, `[point of the grid]`.
 
     Both are empty where the formula shows nowhere.
     """
-    columns = np.concatenate([sight.columns(structure, grid) for sight in sights], axis=1)
+    columns = np.concatenate([clip.columns(structure, grid) for clip in clips], axis=1)
     if structure.nature != "friction":
         columns = columns.sum(axis=0, keepdims=True)
-    target = np.concatenate([sight.target for sight in sights])
+    target = np.concatenate([clip.target for clip in clips])
     power = np.einsum("ovg,pvg->gop", columns, columns)
     along = np.einsum("ovg,v->go", columns, target)
     size = np.trace(power, axis1=1, axis2=2)
@@ -223,15 +225,15 @@ def _gains(
     strength = np.linalg.solve(power, along[..., None])[..., 0]
     gain = 0.5 * np.einsum("go,go->g", along, strength)
     if structure.nature == "friction":
-        for sight in sights:
-            gain = np.where(sight.is_possible(structure, grid, strength), gain, 0.0)
+        for clip in clips:
+            gain = np.where(clip.is_possible(structure, grid, strength), gain, 0.0)
     if structure.nature.startswith("drag"):
         gain = np.where(strength[:, 0] > 0.0, gain, 0.0)  # what drives is no drag
     return gain, strength[:, 0]
 
 
 def _refined(
-    sights: Sequence[Sight],
+    clips: Sequence[LinearisedClip],
     structure: Structure,
     grid: Mapping[str, np.ndarray],
     start: Mapping[str, float],
@@ -244,7 +246,7 @@ def _refined(
     def without(unit: np.ndarray) -> float:
         values = low + unit * (high - low)
         point = {name: values[i : i + 1] for i, name in enumerate(grid)}
-        gain, _ = _gains(sights, structure, point)
+        gain, _ = _gains(clips, structure, point)
         return -float(gain[0]) if gain.size else 0.0
 
     at = (np.array([start[name] for name in grid]) - low) / (high - low)
