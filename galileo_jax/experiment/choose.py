@@ -13,7 +13,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter
 from galileo_jax.experiment.hypothesis_probabilities import Belief, Beliefs, beliefs_of
-from galileo_jax.experiment.predicted_experiment import Rehearsed, rehearse
+from galileo_jax.experiment.predicted_experiment import PredictedExperiment, predict_experiment
 from galileo_jax.experiment.proposal import height_m, propose
 from galileo_jax.experiment.settings import grid, parse_can, text_of
 from galileo_jax.inference.joint_problem import JointProblem
@@ -72,10 +72,10 @@ def expect(
     for i, setting in enumerate(settings):
         progress.report("simulating possible experiments", i / len(settings))
         proposal = propose(clip, trials, scale, setting, seconds)
-        rehearsed = rehearse(proposal, trials, beliefs.of, seed)
-        gain = about_hypotheses(rehearsed, log_odds, beliefs.margin, seed)
-        nats = gain.nats if about is None else _about(trials, beliefs, rehearsed, about)
-        hits = float(beliefs.probability @ [one.hits for one in rehearsed])
+        predicted = predict_experiment(proposal, trials, beliefs.of, seed)
+        gain = about_hypotheses(predicted, log_odds, beliefs.margin, seed)
+        nats = gain.nats if about is None else _about(trials, beliefs, predicted, about)
+        hits = float(beliefs.probability @ [one.hits for one in predicted])
         found.append(Expected(setting, nats, gain.named, gain.lead, hits if has_others else None))
     return found
 
@@ -117,7 +117,7 @@ def sentence_of(best: Expected, about: str | None = None) -> str:
 
 
 def _about(
-    trials: JointProblem, beliefs: Beliefs, rehearsed: Sequence[Rehearsed], about: str
+    trials: JointProblem, beliefs: Beliefs, predicted: Sequence[PredictedExperiment], about: str
 ) -> float:
     """The gain about a parameter, over the hypotheses that have it."""
     has = np.array([_has(trials, belief, about) for belief in beliefs.of])
@@ -125,7 +125,7 @@ def _about(
     weights = _weights(trials, about)
     gains = [
         about_parameter(one, weights) if is_there else 0.0
-        for one, is_there in zip(rehearsed, has, strict=True)
+        for one, is_there in zip(predicted, has, strict=True)
     ]
     return float(share @ gains / share.sum())
 
@@ -168,7 +168,7 @@ def _check_about(trials: JointProblem, beliefs: Beliefs, about: str) -> None:
 def with_next(found: Diagnosis, clip: Clip, trials: JointProblem, seed: int) -> Diagnosis:
     """The diagnosis whose advice begins with what to measure next, where that helps.
 
-    Clips as long as the first are rehearsed, so that nothing is compiled anew.
+    Clips as long as the first are predicted, so that nothing is compiled anew.
     """
     if found.verdict.status != "ambiguous" or not SCENARIOS[clip.scenario].has_ramp:
         return found

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_softmax
 
-from galileo_jax.experiment.predicted_experiment import Rehearsed
+from galileo_jax.experiment.predicted_experiment import PredictedExperiment
 
 NUM_TRACKS = 256  # drawn from each hypothesis
 
@@ -42,7 +42,7 @@ class Gain(NamedTuple):
 
 
 def about_hypotheses(
-    rehearsed: Sequence[Rehearsed], log_odds: np.ndarray, margin: float, seed: int
+    predicted: Sequence[PredictedExperiment], log_odds: np.ndarray, margin: float, seed: int
 ) -> Gain:
     """The gain about which hypothesis holds.
 
@@ -51,11 +51,11 @@ def about_hypotheses(
     log_prior = log_softmax(log_odds)
     generator = np.random.default_rng([seed, 71])
     found = []
-    for truth, one in enumerate(rehearsed):
+    for truth, one in enumerate(predicted):
         u = generator.standard_normal((NUM_TRACKS, one.slopes.shape[1]))
         noise = generator.standard_normal((NUM_TRACKS, len(one.mean)))
         y = one.mean + u @ one.slopes.T + np.sqrt(1.0 + one.rest) * noise
-        after = log_prior[:, None] + np.stack([log_density(other, y) for other in rehearsed])
+        after = log_prior[:, None] + np.stack([log_density(other, y) for other in predicted])
         gained = log_softmax(after, axis=0)[truth] - log_prior[truth]
         rivals = np.delete(after, truth, axis=0).max(axis=0, initial=-np.inf)
         ahead = after[truth] - rivals
@@ -64,7 +64,7 @@ def about_hypotheses(
     return Gain(max(float(nats), 0.0), float(named), float(lead))
 
 
-def about_parameter(one: Rehearsed, weights: np.ndarray) -> float:
+def about_parameter(one: PredictedExperiment, weights: np.ndarray) -> float:
     """The gain about a parameter if a hypothesis holds, nats.
 
     `weights` `[parameter]` combine the trials' parameters, in z.
@@ -78,7 +78,7 @@ def about_parameter(one: Rehearsed, weights: np.ndarray) -> float:
     return 0.5 * float(np.log(before / (along @ np.linalg.solve(information, along))))
 
 
-def log_density(one: Rehearsed, white: np.ndarray) -> np.ndarray:
+def log_density(one: PredictedExperiment, white: np.ndarray) -> np.ndarray:
     """Log N(white; mean, 1 + rest + slopes slopes'), `[draw, value]` to `[draw]`.
 
     Up to the constant that all hypotheses share.

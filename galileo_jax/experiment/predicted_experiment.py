@@ -1,4 +1,4 @@
-"""Rehearses an experiment: what each hypothesis would have the camera see.
+"""What each hypothesis would have the camera see of an experiment.
 
 Draws of a hypothesis' posterior (of what the new clip has for itself: of its priors) are rolled
 out. In units of the noise of this kind of track, a hypothesis' prediction is then described by a
@@ -29,7 +29,7 @@ ONE_SD = 0.683  # of normal values so many are within one standard deviation
 
 
 @dataclass(frozen=True)
-class Rehearsed:
+class PredictedExperiment:
     """What one hypothesis predicts, in units of the noise.
 
     Attributes:
@@ -48,9 +48,9 @@ class Rehearsed:
     root: np.ndarray
 
 
-def rehearse(
+def predict_experiment(
     proposal: Proposal, trials: JointProblem, beliefs: Sequence[Belief], seed: int
-) -> list[Rehearsed]:
+) -> list[PredictedExperiment]:
     """Rolls out every hypothesis at a setting.
 
     Draws are the same for all settings, so that they differ by nothing else.
@@ -111,9 +111,13 @@ def _draws(
     return u[1:], theta, whole
 
 
-def _summary(u: np.ndarray, white: np.ndarray, hits: float, root: np.ndarray) -> Rehearsed:
+def _summary(
+    u: np.ndarray, white: np.ndarray, hits: float, root: np.ndarray
+) -> PredictedExperiment:
     """The regression of values `[draw, value]` on coordinates `[draw, u]`."""
     design = np.column_stack([np.ones(len(u)), u])
     found, *_ = np.linalg.lstsq(design, white, rcond=None)
     left = np.abs(white - design @ found) * np.sqrt(len(u) / max(len(u) - design.shape[1], 1))
-    return Rehearsed(found[0], found[1:].T, np.quantile(left, ONE_SD, axis=0) ** 2, hits, root)
+    return PredictedExperiment(
+        found[0], found[1:].T, np.quantile(left, ONE_SD, axis=0) ** 2, hits, root
+    )

@@ -9,7 +9,7 @@ from scipy.special import log_softmax, logsumexp
 from galileo_jax.experiment import predicted_experiment
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter, log_density
 from galileo_jax.experiment.hypothesis_probabilities import Belief
-from galileo_jax.experiment.predicted_experiment import Rehearsed, rehearse
+from galileo_jax.experiment.predicted_experiment import PredictedExperiment, predict_experiment
 from galileo_jax.experiment.proposal import propose
 from galileo_jax.inference.joint_problem import JointProblem
 from tests.found import fit_of, make_trials
@@ -18,10 +18,10 @@ MARGIN = 3.0
 MONTE_CARLO = 0.05  # nats: three standard errors of 256 tracks from each hypothesis
 
 
-def normal(mean, slopes=None, rest=0.0) -> Rehearsed:
+def normal(mean, slopes=None, rest=0.0) -> PredictedExperiment:
     mean = np.asarray(mean, float)
     slopes = np.zeros((len(mean), 1)) if slopes is None else np.asarray(slopes, float)
-    return Rehearsed(mean, slopes, np.full(len(mean), rest), 0.0, np.eye(slopes.shape[1]))
+    return PredictedExperiment(mean, slopes, np.full(len(mean), rest), 0.0, np.eye(slopes.shape[1]))
 
 
 def test_the_density_is_that_of_the_whole_covariance():
@@ -130,7 +130,7 @@ def test_the_gain_is_that_of_brute_force(trials, height, monkeypatch, tmp_path):
     write_observation_csv(CLIP, trials.problems[0].observation)
     both = beliefs(trials)
     proposal = propose(clip_of(trials), trials, 1.0, {"height": height})
-    ours = about_hypotheses(rehearse(proposal, trials, both, 0), np.zeros(2), MARGIN, 0)
+    ours = about_hypotheses(predict_experiment(proposal, trials, both, 0), np.zeros(2), MARGIN, 0)
 
     monkeypatch.setattr(predicted_experiment, "NUM_DRAWS", 1023)
     white = []
@@ -141,7 +141,7 @@ def test_the_gain_is_that_of_brute_force(trials, height, monkeypatch, tmp_path):
         return summary(u, rows, *rest)
 
     monkeypatch.setattr(predicted_experiment, "_summary", keep)
-    rehearse(proposal, trials, both, 1)
+    predict_experiment(proposal, trials, both, 1)
     generator = np.random.default_rng(5)
     gains = []
     for truth, rows in enumerate(white):

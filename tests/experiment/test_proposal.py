@@ -10,7 +10,7 @@ from galileo_jax.api.diagnose import Diagnosis
 from galileo_jax.api.next_experiment import next_experiment
 from galileo_jax.experiment.choose import best_first, expect, with_next
 from galileo_jax.experiment.hypothesis_probabilities import beliefs_of, read_beliefs, write_beliefs
-from galileo_jax.experiment.predicted_experiment import rehearse
+from galileo_jax.experiment.predicted_experiment import predict_experiment
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.runtime.errors import InputError
@@ -95,7 +95,7 @@ def test_what_has_no_place_is_refused(trials, clip, setting, complaint):
 def test_whether_it_hits_is_seen(trials, clip):
     beliefs = beliefs_of(diagnosis_of(trials, "ambiguous")).of
     low, high = (
-        rehearse(propose(clip, trials, 1.0, {"height": height}), trials, beliefs, 0)
+        predict_experiment(propose(clip, trials, 1.0, {"height": height}), trials, beliefs, 0)
         for height in (0.02, 0.3)
     )
     assert all(one.hits == 0.0 for one in low) and all(one.hits == 1.0 for one in high)
