@@ -41,7 +41,7 @@ from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.measurement.segments.segments import segment
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.similarity.discrepancy import SCALE_SD
 from galileo_jax.simulation.like import truth_like
@@ -166,9 +166,7 @@ def seen(truth: Truth, position_m: np.ndarray, fps: float, noise_m: float) -> Tr
 
 def in_mujoco(truth: Truth, times_s: np.ndarray) -> np.ndarray:
     """The centres in MuJoCo's C engine, `[object, 2, frame]`, m."""
-    shapes = [each.shape for each in truth.objects]
-    scene = compile_scene(truth.surroundings, shapes, truth.objects)
-    model = Model(scene, float(times_s[-1]), (), nuisances=())
+    model = Model(Scene(truth.surroundings, truth.objects), float(times_s[-1]), (), nuisances=())
     theta = np.array([[truth.theta[name] for name in model.names]])
     position = make_engine("c", model).simulate(theta)[0][0]
     return between(position, model.record_dt_s, times_s)

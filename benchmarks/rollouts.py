@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks import tables
 from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.simulation.truth import draw_truth
@@ -67,4 +67,4 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
 
 def _model() -> Model:
     truth = draw_truth(np.random.default_rng(0), 20.0, GIVEN)
-    return Model(compile_scene(truth.surroundings, ["box", "box"], truth.objects), DURATION_S)
+    return Model(Scene(truth.surroundings, truth.objects), DURATION_S)

@@ -33,8 +33,9 @@ from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observat
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
-from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
-from galileo_jax.simulation.free_clip import declared_content, noisy_track, sampled_motion
+from galileo_jax.simulation.free import draw_free, solve_free
+from galileo_jax.simulation.plane import PlaneTruth
+from galileo_jax.simulation.plane_clip import declared_content, noisy_track, sampled_motion
 
 FPS, NOISE_M = 60.0, 0.001
 SCALES_PX_PER_M = (250.0, 900.0)
@@ -136,7 +137,7 @@ def _fitted(
     return {name: of_entry(told[name], value) for name, value in true.items()}, result
 
 
-def _declared(truth: FreeTruth, num_frames: int, is_scaled: bool) -> Clip:
+def _declared(truth: PlaneTruth, num_frames: int, is_scaled: bool) -> Clip:
     content = declared_content(truth, FPS)
     content.pop("liquid_density", None)  # the ratio of the densities is to be told by the motion
     path = Path("clip.yaml")

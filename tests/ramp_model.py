@@ -10,7 +10,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import compile_scene, start_paths
+from galileo_jax.model.scene.scene import Scene, start_paths
 from tests.reference_ramp import Experiment
 
 HIT = Experiment(
@@ -57,7 +57,7 @@ def make_model(experiment: Experiment, duration_s: float) -> Model:
         ClipObject(name=name, shape="box", size_m=(length, 0.06, height))
         for name, (length, height) in zip(surroundings.names, experiment.size_m, strict=False)
     )
-    return Model(compile_scene(surroundings, ["box"] * len(declared), declared), duration_s)
+    return Model(Scene(surroundings, declared), duration_s)
 
 
 def make_theta(model: Model, experiment: Experiment, given: Mapping[str, float] = {}) -> np.ndarray:

@@ -16,8 +16,7 @@ from galileo_jax.model.parameters import Parameter, joined
 from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine, Motion, at_times, in_jax
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times, in_jax
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import trace_cached

@@ -30,8 +30,7 @@ from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.neural.film import Bodies, measured, noisy
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_path import roll_out
-from galileo_jax.rollout.rollout import at_times
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Trajectory, at_times
 
 IDEAL_SHARE = 0.25
 FILMED_SHARE, OWN_SHARE = 0.7, 0.8  # of clips that a camera saw; of those, tracked by us

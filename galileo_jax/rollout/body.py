@@ -128,13 +128,6 @@ def climbs_m_s(solid: Solid, pose: Pose) -> Float[jax.Array, " corner"]:
     return pose.velocity_m_s[2] + spin[0] * levers[:, 1] - spin[1] * levers[:, 0]
 
 
-def energy_j_kg(solid: Solid, pose: Pose) -> jax.Array:
-    """Kinetic and potential energy over the mass."""
-    turning = pose.momentum_m2_s @ spin_rad_s(solid, pose)
-    high = solid.gravity * (pose.position_m[2] - solid.floor_m)
-    return 0.5 * (pose.velocity_m_s @ pose.velocity_m_s + turning) + high
-
-
 def turned_on(
     inertia_m2: Float[jax.Array, " 3"],
     quaternion: jax.Array,

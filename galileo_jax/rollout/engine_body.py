@@ -5,8 +5,6 @@ step. The motion is a continuous function of start and parameters, with JAX's de
 as the order of the impacts stays the same. MuJoCo is the check: tests/rollout/test_engine_body.py.
 """
 
-import functools
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -18,7 +16,6 @@ from galileo_jax.rollout.moreau import Contacts, Masses, least_rises_m_s, steppe
 
 MOST_CONTACTS = 4  # the lowest corners: of a box no more can touch
 MAX_EVENTS = 8  # within one step
-STEP_S = 1 / 592  # four to a frame at 148 Hz
 NEAR_M = 1e-3  # corners so near may come to touch within a step without an impact
 TOUCH_M = 1e-7
 IMPACT_PARTS = 8  # of an impact: friction acts against the slip of its own part
@@ -33,41 +30,24 @@ def roll_out(
       solid: the body and the plane.
       start: at the first frame.
       steps_s: from each frame to the next.
-      substeps: so many steps from frame to frame; `substeps_for` of regular ones.
+      substeps: so many steps from frame to frame.
 
     Returns:
       the poses at all frames, `[frame + 1, ...]`.
     """
 
+    def advance(pose: Pose, _: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        return _to_impact(pose, left_s, is_last, solid)
+
     def frame(pose: Pose, dt_s: jax.Array):
         def substep(_: jax.Array, at: Pose) -> Pose:
-            return _step(at, dt_s / substeps, solid)
+            return step_by_events(advance, at, 0.0, dt_s / substeps, MAX_EVENTS)
 
         after = jax.lax.fori_loop(0, substeps, substep, pose)
         return after, after
 
     _, rest = jax.lax.scan(frame, start, steps_s)
     return jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), start, rest)
-
-
-@functools.partial(jax.jit, static_argnames=("substeps",))
-def roll_out_batch(
-    solid: Solid, start: Pose, steps_s: Float[jax.Array, "batch frame"], substeps: int = 4
-) -> Pose:
-    """Tosses side by side: all arguments with a leading batch axis."""
-    return jax.vmap(functools.partial(roll_out, substeps=substeps))(solid, start, steps_s)
-
-
-def substeps_for(frame_s: float) -> int:
-    """So many steps from frame to frame that none is longer than `STEP_S`."""
-    return max(1, round(frame_s / STEP_S + 0.499))
-
-
-def _step(pose: Pose, dt_s: jax.Array, solid: Solid) -> Pose:
-    def advance(pose: Pose, _: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        return _to_impact(pose, left_s, is_last, solid)
-
-    return step_by_events(advance, pose, 0.0, dt_s, MAX_EVENTS)
 
 
 def _to_impact(
@@ -85,32 +65,18 @@ def _to_impact(
         return gaps_m(solid, at), climbs_m_s(solid, at)
 
     def after(spent_s: jax.Array) -> Pose:
-        return _moved(pose, solid, gaps[lowest], lasts[lowest], lowest, spent_s)
+        def at_middle(middle: Pose) -> tuple[jax.Array, Contacts]:
+            levers = levers_m(solid, middle.quaternion[0])[lowest]
+            least = least_rises_m_s(gaps[lowest], spent_s)
+            falls = jnp.stack([jnp.zeros(()), jnp.zeros(()), -solid.gravity])
+            return falls, _contacts(solid, levers, least, lasts[lowest] & (spent_s > 0))
+
+        return _only(stepped(_alone(pose), _masses(solid), spent_s, at_middle)[0])
 
     def jump(at: Pose, hits: jax.Array) -> Pose:
         return _struck(at, solid, hits, lowest)
 
     return to_crossing(pose, after, level, jump, left_s, ~lasts)
-
-
-def _moved(
-    pose: Pose,
-    solid: Solid,
-    gaps: jax.Array,
-    lasts: jax.Array,
-    lowest: jax.Array,
-    spent_s: jax.Array,
-) -> Pose:
-    """The pose after a time, with contacts that last at the `lowest` corners."""
-
-    def at_middle(middle: Pose) -> tuple[jax.Array, Contacts]:
-        levers = levers_m(solid, middle.quaternion[0])[lowest]
-        least = least_rises_m_s(gaps, spent_s)
-        falls = jnp.stack([jnp.zeros(()), jnp.zeros(()), -solid.gravity])
-        return falls, _contacts(solid, levers, least, lasts & (spent_s > 0))
-
-    found, _ = stepped(_alone(pose), _masses(solid), spent_s, at_middle)
-    return _only(found)
 
 
 def _struck(pose: Pose, solid: Solid, hits: jax.Array, lowest: jax.Array) -> Pose:

@@ -9,6 +9,7 @@ from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
+    finite,
     make_fields,
     make_loads,
     read_state,
@@ -49,9 +50,7 @@ class EngineC:
           every `record_dt_s` from the release on. Entries of a rollout with non-finite
           parameters or one that MuJoCo gave up are NaN.
         """
-        theta = np.asarray(theta, float)
-        is_good = np.all(np.isfinite(theta), axis=1)
-        usable = np.where(is_good[:, None], theta, 0.5)
+        usable, is_good = finite(theta)
         model, scene = self.model, self.model.scene.surroundings
         named = model.by_name(usable)
         law = dynamics(model.effects + model.nuisances, scene, named, np)

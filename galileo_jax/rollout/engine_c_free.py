@@ -32,19 +32,18 @@ from galileo_jax.rollout.free_start import (
     record_before_hit,
 )
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
-from galileo_jax.rollout.mujoco_fields import Loads, make_loads, write_contacts
+from galileo_jax.rollout.mujoco_fields import Faces, Loads, finite, make_loads, write_contacts
 
 # Box contacts and the faces' damping are stable at it; halving it changes hardly anything.
 STEP_S = 1 / 3840
 SETTLE_S = 0.5
 ALONG, ACROSS, UP = 0, 1, 2  # MuJoCo's axes; ACROSS points away from the camera
-# Coefficient of restitution against the faces' stiffness (1/s^2) and damping (1/s), measured on
-# two cubes that meet squarely: at 0.2 and 1.7 m/s, which differ by 0.03 at most.
-RESTITUTION = np.array(
-    [0.0, 0.008, 0.030, 0.065, 0.104, 0.181, 0.316, 0.440, 0.645, 0.797, 0.891, 0.954]
+# Of two cubes that meet squarely, at 0.2 and 1.7 m/s.
+FACES = Faces(
+    np.array([0.0, 0.008, 0.030, 0.065, 0.104, 0.181, 0.316, 0.440, 0.645, 0.797, 0.891, 0.954]),
+    np.array([300.0, 1e5, *[4e5] * 10]),
+    np.array([*[3e3] * 3, 2e3, 1.5e3, 1e3, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0]),
 )
-STIFFNESS = np.array([300.0, 1e5, *[4e5] * 10])
-DAMPING = np.array([*[3e3] * 3, 2e3, 1.5e3, 1e3, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
 
 
 class EngineCFree:
@@ -80,9 +79,7 @@ class EngineCFree:
         Entries of a rollout with non-finite parameters, one that MuJoCo gave up or one whose
         objects meet while the first still crosses the foot are NaN.
         """
-        theta = np.asarray(theta, float)
-        is_good = np.all(np.isfinite(theta), axis=1)
-        usable = np.where(is_good[:, None], theta, 0.5)
+        usable, is_good = finite(theta)
         model, scene = self.model, self.model.scene.surroundings
         effects, named = model.effects + model.nuisances, model.by_name(usable)
         law = dynamics(effects, scene, named, np)
@@ -192,7 +189,7 @@ class EngineCFree:
         batch.expand("body_mass")[:, 1:] = law.inertia
         share = inertia / compiled.body_mass[1:, None]
         batch.expand("body_inertia")[:, 1:] = compiled.body_inertia[1:] * share
-        write_contacts(batch, compiled, law.friction, face_solref(law.restitution))
+        write_contacts(batch, compiled, law.friction, FACES.solref(law.restitution, np))
         batch.bind("qpos")[:] = compiled.qpos0
         batch.set_const()
         batch.warning[...] = 0
@@ -204,12 +201,6 @@ def _join(planar: Poses, after: Poses, begin: int, late: float, model: Model) ->
     found = between_records(after, records - late, model.record_dt_s)
     for values, new in zip(planar, found, strict=True):
         values[..., records] = new
-
-
-def face_solref(restitution: np.ndarray) -> np.ndarray:
-    """The faces' (-stiffness, -damping) `[..., 2]` for a coefficient of restitution."""
-    stiffness = np.exp(np.interp(restitution, RESTITUTION, np.log(STIFFNESS)))
-    return np.stack([-stiffness, -np.interp(restitution, RESTITUTION, DAMPING)], axis=-1)
 
 
 def _sunk_m(compiled: mujoco.MjModel) -> np.ndarray:

@@ -6,12 +6,12 @@ from typing import Any, ClassVar
 
 import jax
 import numpy as np
+from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws, Share
-from galileo_jax.rollout.devices import over_devices
 from galileo_jax.rollout.events import Motion, RollOut
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 from galileo_jax.runtime.batching import RECORDS as LONG
@@ -48,21 +48,9 @@ class EngineJax:
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
         count = self.model.num_records + 1
-        position, velocity = self.rolled(theta, np.full(len(theta), np.inf))
+        always = np.full(len(theta), np.inf)
+        position, velocity = self.each(theta, always, lambda _, *motion: motion)
         return position[..., :count], velocity[..., :count]
-
-    def rolled(
-        self,
-        theta: Float[np.ndarray, "batch parameter"],
-        until_s: Float[np.ndarray, " batch"],
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """As `simulate`, with as many records as programs are compiled for.
-
-        Args:
-          theta: as of `simulate`.
-          until_s: when somebody looks for the last time: later, objects may be anywhere.
-        """
-        return self.each(theta, until_s, lambda _, *motion: motion)
 
     def each(
         self,
@@ -75,7 +63,7 @@ class EngineJax:
 
         Args:
           theta: as of `simulate`.
-          until_s: as of `rolled`.
+          until_s: when somebody looks for the last time: later, objects may be anywhere.
           then: maps parts of a batch, `(theta, position, velocity, *rows)`, each `[part, ...]`, to
             a PyTree of arrays `[part, ...]`.
           *rows: more arguments of `then`, `[batch, ...]`.
@@ -128,22 +116,18 @@ class EngineJax:
 
     def traceable(self, theta: Float[jax.Array, "batch parameter"]) -> Motion:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""
-        position, velocity = self._rolled_up(theta)
-        count = self.model.num_records + 1
-        return position[..., :count], velocity[..., :count]
-
-    def _rolled_up(self, theta: Any) -> Motion:
-        """As many records as programs are compiled for."""
         model = self.model
-        return _roll_out_batch(
+        count = model.num_records + 1
+        position, velocity = _roll_out_batch(
             self.roll_out,
             model.effects + model.nuisances,
             model.names,
-            rounded_up(model.num_records + 1, RECORDS),
+            rounded_up(count, RECORDS),
             model.record_dt_s,
             theta,
             self._scene,
         )
+        return position[..., :count], velocity[..., :count]
 
 
 @trace_cached(num_static=5)
@@ -161,4 +145,19 @@ def _roll_out_batch(
     def one(theta: jax.Array, shared: tuple[Surroundings, Any, Any]) -> Motion:
         return roll_out(effects, names, num_records, dt_s, theta, *shared)
 
-    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, (scene, count, acts))
+    return _over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, (scene, count, acts))
+
+
+def _over_devices(function: Callable[..., Any], num_rows: int) -> Callable[..., Any]:
+    """`function` of a batch `[row, ...]` and what all share, its rows spread over the devices.
+
+    Each device works off its own part: a loop that ends early in one waits for no other. `function`
+    itself where there is one device, or where the rows cannot be shared out evenly.
+    """
+    devices = jax.local_devices()
+    if len(devices) == 1 or num_rows % len(devices):
+        return function
+    rows, mesh = PartitionSpec("row"), Mesh(np.array(devices), ("row",))
+    return jax.shard_map(
+        function, mesh=mesh, in_specs=(rows, PartitionSpec()), out_specs=rows, check_vma=False
+    )

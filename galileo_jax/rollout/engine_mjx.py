@@ -14,6 +14,7 @@ from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
+    finite,
     make_fields,
     make_loads,
     read_state,
@@ -50,9 +51,7 @@ class EngineMJX:
           Centres (m) and velocities (m/s), each `[batch, object, 2, record + 1]`; NaN where
           the parameters are not finite.
         """
-        theta = np.asarray(theta, float)
-        is_good = np.all(np.isfinite(theta), axis=1)
-        usable = np.where(is_good[:, None], theta, 0.5)
+        usable, is_good = finite(theta)
         missing = -len(usable) % self.batch
         padded = np.concatenate([usable, np.repeat(usable[:1], missing, axis=0)])
         parts = padded.reshape(-1, self.batch, padded.shape[1])

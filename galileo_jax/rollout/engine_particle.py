@@ -9,9 +9,9 @@ from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.events import Motion, Task, of_task
-from galileo_jax.rollout.particle_discs import disc_system
-from galileo_jax.rollout.particle_free import free_system
-from galileo_jax.rollout.particle_pendulum import pendulum_system
+from galileo_jax.rollout.particle_discs import DiscSystem
+from galileo_jax.rollout.particle_free import FreeSystem
+from galileo_jax.rollout.particle_pendulum import PendulumSystem
 from galileo_jax.runtime.errors import InputError
 
 
@@ -19,9 +19,9 @@ from galileo_jax.runtime.errors import InputError
 def roll_out(task: Task) -> Motion:
     """What moves in the scene."""
     if task.scene.is_level:
-        return task.motion(disc_system(task))
+        return task.motion(DiscSystem(task))
     is_pendulum = PENDULUM in task.scene.laws
-    return task.motion(pendulum_system(task) if is_pendulum else free_system(task))
+    return task.motion(PendulumSystem(task) if is_pendulum else FreeSystem(task))
 
 
 class EngineParticle(EngineJax):

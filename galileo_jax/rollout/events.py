@@ -32,27 +32,6 @@ PART = 16  # records are made in parts of so many, as many parts as are asked fo
 NEWTON_STEPS = 8
 
 
-class System(NamedTuple):
-    """What an engine moves, and how.
-
-    Attributes:
-      start: the state at the release.
-      advance: `(state, time_s, left_s, is_last)` to the state at the next event, or after
-        `left_s`, and the time that took; the latter in any case where `is_last`, so that events
-        that never end hold up nobody.
-      most_events: so many advances make up a step at most; 1: there are no events.
-      seen: states `[record, ...]` and their times to centres and velocities.
-      part: where motion between events is known in closed form, a state and the index of its
-        record to the state `PART` records later, and those at the records, `[record, ...]`.
-    """
-
-    start: Any
-    advance: Advance
-    most_events: int
-    seen: Callable[[Any, jax.Array], Motion]
-    part: Part | None = None
-
-
 class Task(NamedTuple):
     """What is rolled out.
 
@@ -78,10 +57,42 @@ class Task(NamedTuple):
         """The equations of motion."""
         return dynamics(self.effects, self.scene, self.named, jnp, self.acts)
 
-    def motion(self, system: System) -> Motion:
+    def motion(self, system: "System") -> Motion:
         """What a system does."""
         states = recorded(system, self.num_records, self.dt_s, self.count)
         return system.seen(states, self.dt_s * jnp.arange(self.num_records))
+
+
+class System:
+    """What an engine moves, and how; from the task alone.
+
+    Attributes:
+      law, scene: of the task.
+      start: the state at the release.
+      most_events: so many advances make up a step at most; 1: there are no events.
+      part: where motion between events is known in closed form, a state and the index of its
+        record to the state `PART` records later, and those at the records, `[record, ...]`.
+    """
+
+    start: Any
+    most_events = 16
+    part: Part | None = None
+
+    def __init__(self, task: Task):
+        self.law, self.scene = task.law(), task.scene
+
+    def advance(
+        self, state: Any, time_s: jax.Array, left_s: jax.Array, is_last: Any
+    ) -> tuple[Any, jax.Array]:
+        """The state at the next event, or after `left_s`, and the time that took.
+
+        The latter in any case where `is_last`, so that events that never end hold up nobody.
+        """
+        raise NotImplementedError
+
+    def seen(self, states: Any, times_s: jax.Array) -> Motion:
+        """Centres and velocities, of states `[record, ...]` and their times."""
+        raise NotImplementedError
 
 
 def of_task(follows: Callable[[Task], Any]) -> Callable[..., Any]:

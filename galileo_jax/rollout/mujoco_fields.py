@@ -26,13 +26,35 @@ from galileo_jax.rollout.motion import (
     to_plane,
 )
 
-# Coefficient of restitution against the bumpers' stiffness (1/s^2) and damping (1/s), measured
-# on this scene at 0.3 and 1 m/s (tests/rollout/test_restitution.py): above 600/s the damping
-# would outrun the time step, so that a small e stiffens the spring first.
-RESTITUTION = np.array([0.0, 0.0155, 0.046, 0.11, 0.244, 0.295, 0.417, 0.625, 0.783, 0.882, 0.95])
-STIFFNESS = np.array([300.0, 3e3, 1e4, 3e4, 1e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5])
-DAMPING = np.array([600.0, 600.0, 600.0, 600.0, 600.0, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
 FOOT_ZONE_M = 0.03  # of the size of an object, which takes so long to cross the edge
+
+
+class Faces(NamedTuple):
+    """Coefficients of restitution, and stiffness (1/s^2) and damping (1/s) with which they come.
+
+    Measured within 0.03. Damping may not outrun the time step, so that a small e stiffens the
+    spring first.
+    """
+
+    restitution: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+
+    def solref(self, restitution: Array, xp: Any) -> Array:
+        """MuJoCo's direct solref (-stiffness, -damping), `[..., 2]`; of e = 0 exactly the first."""
+        stiffness = xp.exp(xp.interp(restitution, self.restitution, np.log(self.stiffness)))
+        stiffness = xp.where(restitution == 0, self.stiffness[0], stiffness)
+        damping = xp.interp(restitution, self.restitution, self.damping)
+        return xp.stack([-stiffness, -damping], axis=-1)
+
+
+# Of scenes/ramp.xml, at 0.3 and 1 m/s (tests/rollout/test_restitution.py); overdamped 17 times
+# at e = 0.
+BUMPERS = Faces(
+    np.array([0.0, 0.0155, 0.046, 0.11, 0.244, 0.295, 0.417, 0.625, 0.783, 0.882, 0.95]),
+    np.array([300.0, 3e3, 1e4, 3e4, 1e5, *[1.4e5] * 6]),
+    np.array([*[600.0] * 6, 400.0, 200.0, 100.0, 50.0, 20.0]),
+)
 
 
 class Fields(NamedTuple):
@@ -67,6 +89,13 @@ class Loads(NamedTuple):
     is_steady: bool
 
 
+def finite(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters `[batch, parameter]` that can be rolled out, and of which rows they are true."""
+    theta = np.asarray(theta, float)
+    is_good = np.all(np.isfinite(theta), axis=1)
+    return np.where(is_good[:, None], theta, 0.5), is_good
+
+
 def make_fields(law: Dynamics, scene: Surroundings, xp: Any) -> Fields:
     """Maps the equations of motion to the model's fields and the start."""
     declared = xp.asarray(scene.angle_rad)
@@ -77,7 +106,7 @@ def make_fields(law: Dynamics, scene: Surroundings, xp: Any) -> Fields:
         friction=law.friction,
         qpos=(place - xp.asarray(scene.start_m)).reshape(flat),
         qvel=speed.reshape(flat),
-        bumper=bumper_solref(law.restitution, xp),
+        bumper=BUMPERS.solref(law.restitution, xp),
     )
 
 
@@ -177,17 +206,6 @@ def write_contacts(
             written[:, i, :2] = friction[:, which, None]
         elif faces is not None:
             batch.expand("pair_solref")[:, i] = faces
-
-
-def bumper_solref(restitution: Array, xp: Any) -> Array:
-    """The bumpers' (-stiffness, -damping) for a coefficient of restitution, within 0.03.
-
-    0 gives scenes/ramp.xml's own values exactly: overdamped 17 times, e < 0.002.
-    """
-    stiffness = xp.exp(xp.interp(restitution, RESTITUTION, np.log(STIFFNESS)))
-    stiffness = xp.where(restitution == 0, STIFFNESS[0], stiffness)
-    damping = xp.interp(restitution, RESTITUTION, DAMPING)
-    return xp.stack([-stiffness, -damping], axis=-1)
 
 
 def read_state(

@@ -15,51 +15,103 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.rollout.disc_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
-from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.events import Motion, System, Task
-from galileo_jax.rollout.motion import state_at, total
+from galileo_jax.rollout.disc_hits import (
+    ROOT2,
+    Discs,
+    Table,
+    after_bounce,
+    after_hit,
+    bounce_times_s,
+    hit_times_s,
+    length,
+)
+from galileo_jax.rollout.events import System, Task
+from galileo_jax.rollout.motion import Dynamics, state_at, total
 from galileo_jax.rollout.particle_free import start_velocity
 
-MAX_EVENTS = 16  # within one recorded step
 
-
-def disc_system(task: Task) -> System:
+class DiscSystem(System):
     """Discs on a level table; the track's third axis, where it has one, is the turning, rad."""
-    scene, shown = task.scene, _magnified(task)
-    table = _table(task, shown)
-    velocity = start_velocity(task.effects, task.named, scene)
-    assert velocity is not None  # the pucks' law gives one
-    first = jnp.asarray(scene.start_m)
-    # Starts and turning as the camera's scale will show them.
-    start = first[0, :2] + (first[:, :2] - first[0, :2]) / shown + table.rims.offset_m
-    discs = Discs(
-        jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
-        jnp.concatenate(
-            [velocity[:, :2], (table.radius_m * velocity[:, 2] / ROOT2)[:, None]], axis=1
-        ),
-        jnp.zeros(len(scene.names)),
-    )
 
-    def advance(discs: Discs, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        return _to_next_event(discs, time_s, left_s, is_last, table, scene)
+    def __init__(self, task: Task):
+        super().__init__(task)
+        self.shown = _magnified(task)
+        self.table = _table(task, self.law, self.shown)
+        velocity = start_velocity(task.effects, task.named, task.scene)
+        assert velocity is not None  # the pucks' law gives one
+        first = jnp.asarray(task.scene.start_m)
+        # Starts and turning as the camera's scale will show them.
+        start = first[0, :2] + (first[:, :2] - first[0, :2]) / self.shown
+        turning = (self.table.radius_m * velocity[:, 2] / ROOT2)[:, None]
+        self.start = Discs(
+            jnp.pad(start + self.table.rims.offset_m, ((0, 0), (0, 1))),
+            jnp.concatenate([velocity[:, :2], turning], axis=1),
+            jnp.zeros(len(start)),
+        )
 
-    def seen(discs: Discs, _: jax.Array) -> Motion:
-        place, speed = (jnp.moveaxis(each, 0, -1) for each in (discs.place_m, discs.speed_m_s))
-        if scene.num_axes == 2:
+    def seen(self, states, times_s):
+        """As the camera shows them."""
+        place, speed = (jnp.moveaxis(each, 0, -1) for each in (states.place_m, states.speed_m_s))
+        if self.scene.num_axes == 2:
             return place[:, :2], speed[:, :2]
-        per_turn = ROOT2 / table.radius_m[:, None, None] / shown
-        turned = first[0, 2] + (first[:, 2:, None] - first[0, 2]) / shown + per_turn * place[:, 2:]
+        first = jnp.asarray(self.scene.start_m)
+        per_turn = ROOT2 / self.table.radius_m[:, None, None] / self.shown
+        turned = first[0, 2] + (first[:, 2:, None] - first[0, 2]) / self.shown
         return (
-            jnp.concatenate([place[:, :2], turned], axis=1),
+            jnp.concatenate([place[:, :2], turned + per_turn * place[:, 2:]], axis=1),
             jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
         )
 
-    return System(discs, advance, MAX_EVENTS, seen)
+    def advance(self, state, time_s, left_s, is_last):
+        """To the next stop, hit or bounce."""
+        discs, table = state, self.table
+        pairs = np.array(list(combinations(range(len(self.scene.names)), 2)), int).reshape(-1, 2)
+        a = self._acceleration(discs, time_s)
+        half = 0.5 * jnp.minimum(left_s, jnp.min(_stops(discs, a)))
+        a = self._acceleration(discs.after(a, half), time_s + half)
+        # What rests stays, whatever the half step before it rounds to.
+        rests = (length(discs.speed_m_s) == 0) & (length(a) == 0)
+        a = jnp.where(rests[:, None], 0.0, a)
+        stops, hits = _stops(discs, a), hit_times_s(discs, a, pairs, left_s, table)
+        bounces = bounce_times_s(discs, a, left_s, table)
+        soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits, bounces.ravel()])))
+        t = jnp.where(is_last, left_s, soonest)
+        moved = discs.after(a, t)
+        place, speed = moved.place_m, jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
+        for k, pair in enumerate(pairs):
+            speed = jnp.where(hits[k] <= t, after_hit(moved, speed, pair, table), speed)
+        for wall, bounce in enumerate(bounces):
+            back, bounced = after_bounce(moved._replace(place_m=place), speed, wall, table)
+            place = jnp.where((bounce <= t)[:, None], back, place)
+            speed = jnp.where((bounce <= t)[:, None], bounced, speed)
+        return moved._replace(place_m=place, speed_m_s=speed), t
+
+    def _acceleration(self, discs: Discs, time_s: jax.Array) -> jax.Array:
+        """Of every disc, `[object, 3]`."""
+        law, scene, speed = self.law, self.scene, discs.speed_m_s
+        along = length(speed[:, :2])
+        forward = speed[:, :2] / jnp.where(along > 0, along, 1.0)[:, None]
+        lever = _lever(discs, self.table)
+        slip = speed.at[:, :2].add(speed[:, 2:] * lever)
+        size = length(slip)
+        drive = law.drive(state_at(discs.way_m, along, time_s, scene)) / law.inertia
+        brake = law.brake(state_at(discs.way_m, size, time_s, scene)) / law.inertia
+        downhill = law.gravity * jnp.stack([jnp.sin(law.ramp_rad), jnp.sin(law.table_rad)])
+        pull = jnp.concatenate(
+            [drive[:, None] * forward + downhill, jnp.zeros((len(scene.names), 1))], axis=1
+        )
+        strength = length(pull)
+        against = jnp.where(
+            (size > 0)[:, None],
+            slip / jnp.where(size > 0, size, 1.0)[:, None],
+            pull / jnp.where(strength > 0, strength, 1.0)[:, None],
+        )
+        against = against.at[:, 2].add(jnp.sum(lever * against[:, :2], axis=1))
+        held = (size == 0) & (strength <= brake)
+        return jnp.where(held[:, None], 0.0, pull - brake[:, None] * against)
 
 
-def _table(task: Task, shown: jax.Array) -> Table:
+def _table(task: Task, law: Dynamics, shown: jax.Array) -> Table:
     """What does not change in a rollout; `shown`: how many times as large lengths look."""
     effects, named, scene, *_ = task
     rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
@@ -68,7 +120,7 @@ def _table(task: Task, shown: jax.Array) -> Table:
         origin = jnp.asarray(scene.start_m)[0, :2]
         walls = walls._replace(ends_m=origin + (walls.ends_m - origin) / shown)
     return Table(
-        task.law(),
+        law,
         rims,
         jnp.asarray(scene.half_length_m),
         walls,
@@ -84,66 +136,6 @@ def _magnified(task: Task) -> jax.Array:
     for effect in task.effects:
         ends = effect.measure(ends, task.named, task.scene)
     return ends[0, 0, 1] - ends[0, 0, 0]
-
-
-def _to_next_event(
-    discs: Discs,
-    time_s: jax.Array,
-    left_s: jax.Array,
-    is_last: jax.Array,
-    table: Table,
-    scene: Surroundings,
-) -> tuple[Discs, jax.Array]:
-    """Moves on to the next event, or by `left_s`; returns the discs and the time it took."""
-    pairs = np.array(list(combinations(range(len(scene.names)), 2)), int).reshape(-1, 2)
-    a = _acceleration(discs, time_s, table, scene)
-    half = 0.5 * jnp.minimum(left_s, jnp.min(_stops(discs, a)))
-    middle = discs.after(a, half)
-    a = _acceleration(middle, time_s + half, table, scene)
-    # What rests stays, whatever the half step before it rounds to.
-    rests = (length(discs.speed_m_s) == 0) & (length(a) == 0)
-    a = jnp.where(rests[:, None], 0.0, a)
-    stops, hits = _stops(discs, a), hit_times_s(discs, a, pairs, left_s, table)
-    bounces = bounce_times_s(discs, a, left_s, table)
-    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits, bounces.ravel()])))
-    t = jnp.where(is_last, left_s, soonest)
-    moved = discs.after(a, t)
-    speed = jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
-    for k, pair in enumerate(pairs):
-        struck = after_hit(moved, speed, pair, table)
-        speed = jnp.where(hits[k] <= t, struck, speed)
-    place = moved.place_m
-    for wall in range(bounces.shape[0]):
-        is_hit = bounces[wall] <= t
-        back, bounced = after_bounce(moved._replace(place_m=place), speed, wall, table)
-        place = jnp.where(is_hit[:, None], back, place)
-        speed = jnp.where(is_hit[:, None], bounced, speed)
-    return moved._replace(place_m=place, speed_m_s=speed), t
-
-
-def _acceleration(discs: Discs, time_s: jax.Array, table: Table, scene: Surroundings) -> jax.Array:
-    """Of every disc, `[object, 3]`."""
-    law, speed = table.law, discs.speed_m_s
-    along = length(speed[:, :2])
-    forward = speed[:, :2] / jnp.where(along > 0, along, 1.0)[:, None]
-    lever = _lever(discs, table)
-    slip = speed.at[:, :2].add(speed[:, 2:] * lever)
-    size = length(slip)
-    drive = law.drive(state_at(discs.way_m, along, time_s, scene)) / law.inertia
-    brake = law.brake(state_at(discs.way_m, size, time_s, scene)) / law.inertia
-    downhill = law.gravity * jnp.stack([jnp.sin(law.ramp_rad), jnp.sin(law.table_rad)])
-    pull = jnp.concatenate(
-        [drive[:, None] * forward + downhill, jnp.zeros((len(scene.names), 1))], axis=1
-    )
-    strength = length(pull)
-    against = jnp.where(
-        (size > 0)[:, None],
-        slip / jnp.where(size > 0, size, 1.0)[:, None],
-        pull / jnp.where(strength > 0, strength, 1.0)[:, None],
-    )
-    against = against.at[:, 2].add(jnp.sum(lever * against[:, :2], axis=1))
-    held = (size == 0) & (strength <= brake)
-    return jnp.where(held[:, None], 0.0, pull - brake[:, None] * against)
 
 
 def _lever(discs: Discs, table: Table) -> jax.Array:

@@ -13,14 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
-from galileo_jax.rollout.events import (
-    PLASTIC_M_S,
-    Motion,
-    System,
-    Task,
-    runge_kutta,
-    to_crossing,
-)
+from galileo_jax.rollout.events import PLASTIC_M_S, System, Task, runge_kutta, to_crossing
 from galileo_jax.rollout.motion import Dynamics, state_at, total
 
 MAX_BOUNCES = 8  # within one recorded step
@@ -40,27 +33,56 @@ class Body(NamedTuple):
     way_m: Float[jax.Array, ""]
 
 
-def free_system(task: Task) -> System:
+class FreeSystem(System):
     """One body that slides on nothing."""
-    law, scene = task.law(), task.scene
-    tangent = _along(law, scene, jnp)
-    floor = floor_of(task.effects, task.named, scene)
-    velocity = start_velocity(task.effects, task.named, scene)
-    start = Body(
-        jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
-        law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],
-        jnp.zeros(()),
-    )
 
-    def advance(body: Body, time_s: jax.Array, left_s: jax.Array, is_last: Any):
+    def __init__(self, task: Task):
+        super().__init__(task)
+        law, scene = self.law, self.scene
+        self.upward = _upward(scene, jnp)
+        self.floor = floor_of(task.effects, task.named, scene)
+        self.most_events = 1 if self.floor is None else MAX_BOUNCES
+        tangent = _along(law, scene, jnp)
+        velocity = start_velocity(task.effects, task.named, scene)
+        self.start = Body(
+            jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
+            law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],
+            jnp.zeros(()),
+        )
+
+    def advance(self, state, time_s, left_s, is_last):
+        """To the next bounce; what bounces faster than the last rests."""
+        body, floor = state, self.floor
         if floor is None:
-            return _moved(body, time_s, left_s, law, scene, rests=False), left_s
-        return _to_bounce(body, time_s, left_s, is_last, law, scene, floor)
+            return self._moved(body, time_s, left_s, False), left_s
+        rests = (body.position_m[1] <= floor.height_m) & (body.velocity_m_s[1] == 0)
 
-    def seen(bodies: Body, _: jax.Array) -> Motion:
-        return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
+        def level(at: Body, _: jax.Array) -> tuple[jax.Array, jax.Array]:
+            return at.position_m[1] - floor.height_m, at.velocity_m_s[1]
 
-    return System(start, advance, 1 if floor is None else MAX_BOUNCES, seen)
+        def bounced(at: Body, _: jax.Array) -> Body:
+            falls = -at.velocity_m_s[1]
+            rebound = jnp.where((falls > PLASTIC_M_S) & ~is_last, floor.restitution * falls, 0.0)
+            return at._replace(
+                position_m=jnp.where(self.upward, floor.height_m, at.position_m),
+                velocity_m_s=jnp.where(self.upward, rebound, at.velocity_m_s * (1 - floor.grip)),
+            )
+
+        def after(spent_s: jax.Array) -> Body:
+            return self._moved(body, time_s, spent_s, rests)
+
+        found, spent_s = to_crossing(body, after, level, bounced, left_s, ~rests)
+        return found, jnp.where(is_last, left_s, spent_s)
+
+    def seen(self, states, times_s):
+        """As they are."""
+        return states.position_m.T[None], states.velocity_m_s.T[None]
+
+    def _moved(self, body: Body, time_s: Any, spent_s: jax.Array, rests: Any) -> Body:
+        """The body after a time without a bounce."""
+        return runge_kutta(
+            lambda at, t: rates(at, t, self.law, self.scene, rests), body, time_s, spent_s
+        )
 
 
 def start_velocity(
@@ -121,41 +143,3 @@ def _along(law: Dynamics, scene: Surroundings, xp: Any) -> Any:
 def _upward(scene: Surroundings, xp: Any) -> Any:
     """Which axis is upward, `[axis]`."""
     return xp.asarray([axis == 1 for axis in range(scene.num_axes)])
-
-
-def _moved(
-    body: Body, time_s: Any, spent_s: jax.Array, law: Dynamics, scene: Surroundings, rests: Any
-) -> Body:
-    """The body after a time without a bounce."""
-    return runge_kutta(lambda at, t: rates(at, t, law, scene, rests), body, time_s, spent_s)
-
-
-def _to_bounce(
-    body: Body,
-    time_s: jax.Array,
-    left_s: jax.Array,
-    is_last: jax.Array,
-    law: Dynamics,
-    scene: Surroundings,
-    floor: Bounce,
-) -> tuple[Body, jax.Array]:
-    """Moves on to the next bounce, or by `left_s`; what bounces faster than the last rests."""
-    upward = _upward(scene, jnp)
-    rests = (body.position_m[1] <= floor.height_m) & (body.velocity_m_s[1] == 0)
-
-    def level(at: Body, _: jax.Array) -> tuple[jax.Array, jax.Array]:
-        return at.position_m[1] - floor.height_m, at.velocity_m_s[1]
-
-    def bounced(at: Body, _: jax.Array) -> Body:
-        falls = -at.velocity_m_s[1]
-        rebound = jnp.where((falls > PLASTIC_M_S) & ~is_last, floor.restitution * falls, 0.0)
-        return at._replace(
-            position_m=jnp.where(upward, floor.height_m, at.position_m),
-            velocity_m_s=jnp.where(upward, rebound, at.velocity_m_s * (1 - floor.grip)),
-        )
-
-    def after(spent_s: jax.Array) -> Body:
-        return _moved(body, time_s, spent_s, law, scene, rests)
-
-    found, spent_s = to_crossing(body, after, level, bounced, left_s, ~rests)
-    return found, jnp.where(is_last, left_s, spent_s)

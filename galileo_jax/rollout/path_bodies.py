@@ -1,20 +1,15 @@
-"""Bodies on their path, one number at a time: what the rigid engine moves and knocks together.
+"""Bodies on their path, one number at a time: their state, and what those that touch do together.
 
 Numbers of objects are tuples, not arrays `[object]`: a batch of rollouts is then one vector for
 each, which a core computes several entries of at a time. Loops over objects are unrolled.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
-
-from galileo_jax.model.effects.effect import State, Surroundings
-from galileo_jax.rollout.motion import Dynamics, state_at
-
-TOUCH_M, TOUCH_M_S = 1e-9, 1e-9
 
 Number = Float[jax.Array, ""]
 Numbers = tuple[Number, ...]
@@ -40,35 +35,21 @@ class Bodies(NamedTuple):
         """How fast each slides over its surface."""
         return tuple(v - u for v, u in zip(self.speed_m_s, self.rim_m_s, strict=True))
 
-    def gap_m(self, law: Dynamics, scene: Surroundings) -> Numbers:
-        """Between the faces of neighbours; below 0 where these knock as soon as they approach."""
-
-        def between(i: int) -> Number:
-            x = [self.path_m[j] + scene.corner_m[j] for j in (i, i + 1)]
-            apart = x[1] - x[0] - scene.half_length_m[i + 1] - scene.half_length_m[i]
-            # What stands in the way is past its start, or about to be, once it was hit.
-            past_m = self.path_m[i + 1] - law.start_m[i + 1]
-            hit = (past_m > TOUCH_M) | ((past_m > -TOUCH_M) & (self.speed_m_s[i + 1] > 0))
-            return apart - jnp.where(hit, law.overlap_m, 0.0)
-
-        return tuple(between(i) for i in range(len(self.path_m) - 1))
-
-    def touches(self, law: Dynamics, scene: Surroundings) -> Links:
-        """Whether neighbours rest against each other or move as one."""
-        v = self.speed_m_s
-        return tuple(
-            (gap < TOUCH_M) & (jnp.abs(v[i + 1] - v[i]) < TOUCH_M_S)
-            for i, gap in enumerate(self.gap_m(law, scene))
+    def after(self, a: "Accelerations", t: jax.Array) -> "Bodies":
+        """The bodies after a time `t` of constant accelerations."""
+        q, v, u = self
+        return Bodies(
+            tuple(q + v * t + 0.5 * a * t**2 for q, v, a in zip(q, v, a.centre, strict=True)),
+            tuple(v + a * t for v, a in zip(v, a.centre, strict=True)),
+            tuple(u + a * t for u, a in zip(u, a.rim, strict=True)),
         )
 
-    def state(self, speed_m_s: Numbers, time_s: jax.Array, scene: Surroundings) -> State:
-        """What a law sees, with its speed."""
-        return state_at(jnp.stack(self.path_m), jnp.stack(speed_m_s), time_s, scene)
 
+class Accelerations(NamedTuple):
+    """Of centres and rims, m/s^2."""
 
-def rolls(scene: Surroundings, i: int) -> bool:
-    """Whether object `i` is round and may turn."""
-    return bool(scene.rolls) and scene.rolls[i]
+    centre: Numbers
+    rim: Numbers
 
 
 def of_group(values: Sequence[Number], links: Links) -> Numbers:
@@ -87,11 +68,62 @@ def of_group(values: Sequence[Number], links: Links) -> Numbers:
     return tuple(sum(beside(i, 1), sum(beside(i, -1), own)) for i, own in enumerate(values))
 
 
-def apart(count: int) -> Links:
-    """Every object a group of its own."""
-    return (False,) * (count - 1)
+def in_groups(move: Callable[[Links], tuple[Numbers, Any]], touches: Links) -> tuple[Numbers, Any]:
+    """How bodies move when those that touch, and would pass those ahead, move as one.
+
+    `move`: what groups do, the first of it to compare. Groups grow until nobody passes anybody.
+    """
+    links: Links = (False,) * len(touches)
+    found = move(links)
+    for _ in touches:
+        for i, touch in enumerate(touches):
+            link = links[i] | (touch & (found[0][i] > found[0][i + 1]))
+            links = (*links[:i], link, *links[i + 1 :])
+            found = move(links)
+    return found
 
 
-def with_link(links: Links, i: int, when: jax.Array) -> Links:
-    """The groups of neighbours i and i + 1 made one."""
-    return (*links[:i], links[i] | when, *links[i + 1 :])
+class Forces(NamedTuple):
+    """What acts on each body: pull and brake, N; whether it sticks; kg; what rolling adds, kg."""
+
+    pull: Numbers
+    brake: Numbers
+    sticks: tuple[jax.Array, ...]
+    inertia: Numbers
+    turning: dict[int, Number]
+
+    def move(self, links: Links) -> tuple[Numbers, dict[int, Number]]:
+        """Accelerations of groups, and the way those that should roll slip all the same.
+
+        Of a group's members those that slip are braked by all their friction; those at rest hold it
+        with up to theirs; and those that roll turn with it, each as long as its friction can turn
+        it so fast.
+        """
+        pull, brake, sticks, inertia, turning = self
+        objects = range(len(pull))
+        rest = [
+            jnp.zeros_like(pull[i]) if i in turning else jnp.where(sticks[i], brake[i], 0.0)
+            for i in objects
+        ]
+        both = zip(of_group(pull, links), of_group(rest, links), strict=True)
+        left = [force - jnp.clip(force, -held, held) for force, held in both]
+        masses = of_group(inertia, links)
+        slips = {i: jnp.zeros_like(pull[i]) for i in turning}
+
+        def with_grip() -> Numbers:
+            rubs, turns = ([jnp.zeros_like(one) for one in pull] for _ in range(2))
+            for i, slip in slips.items():
+                rubs[i] = slip * brake[i]
+                turns[i] = jnp.where(sticks[i] & (slip == 0), turning[i], 0.0)
+            rubbed, turned = of_group(rubs, links), of_group(turns, links)
+            return tuple((left[i] - rubbed[i]) / (masses[i] + turned[i]) for i in objects)
+
+        if not turning:
+            return tuple(force / mass for force, mass in zip(left, masses, strict=True)), slips
+        a = with_grip()
+        for _ in turning:
+            for i in turning:
+                fails = sticks[i] & (jnp.abs(a[i]) * turning[i] > brake[i])
+                slips[i] = jnp.where(fails, jnp.sign(left[i]), slips[i])
+            a = with_grip()
+        return a, slips

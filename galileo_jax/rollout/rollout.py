@@ -6,7 +6,7 @@ takes differences of whole batches at the posterior's scale, with every engine.
 """
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -15,13 +15,28 @@ from jaxtyping import Float
 
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.events import cubic
-from galileo_jax.rollout.trajectory import Trajectory
 
 JUMP_M_S2 = 30.0  # no steady force accelerates so much
 
 Places = Float[np.ndarray, "batch object axis record"]
 Motion = tuple[Places, Places]
 """Centres (m) and velocities (m/s), from the release on, every `Model.record_dt_s`."""
+
+
+class Trajectory(NamedTuple):
+    """Simulated motion of all objects' centres on the engine's own time grid.
+
+    Leading batch axes are allowed before the axes named here.
+
+    Attributes:
+      times_s: `[step]`, s since the release, evenly spaced.
+      position_m: `[object, 2, step]`, m; x along the travel, y up, origin at the foot.
+      velocity_m_s: `[object, 2, step]`, m/s.
+    """
+
+    times_s: jax.Array
+    position_m: jax.Array
+    velocity_m_s: jax.Array
 
 
 @runtime_checkable

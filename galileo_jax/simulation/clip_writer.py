@@ -6,10 +6,8 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.check_settings import checked
 from galileo_jax.simulation.clip_files import all_or_nothing
-from galileo_jax.simulation.free_clip import free_clips
 from galileo_jax.simulation.hidden import make_hidden
-from galileo_jax.simulation.level import SCENARIO
-from galileo_jax.simulation.level_clip import level_clips
+from galileo_jax.simulation.plane_clip import plane_clips
 from galileo_jax.simulation.ramp_clip import ramp_clips
 from galileo_jax.simulation.settings import Settings
 
@@ -35,10 +33,8 @@ def write_clips(out: Path, settings: Settings) -> tuple[Path, ...]:
         progress.report("simulating", 0.0)
         if settings.has_ramp:
             writers = ramp_clips(settings, hidden, out.stem)
-        elif settings.scenario == SCENARIO:
-            writers = level_clips(settings, hidden)
         else:
-            writers = free_clips(settings, hidden)
+            writers = plane_clips(settings, hidden)
     count = len(writers)
     names = [f"{out.stem}_{i + 1}" if settings.series else out.stem for i in range(count)]
     try:

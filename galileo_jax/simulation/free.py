@@ -1,121 +1,50 @@
-"""What is not on a ramp: falls, flights, springs, liquids and pendulums with known truth.
+"""What is on no ramp and no table: falls, flights, springs, liquids and pendulums.
 
-The laws are the effects' (`rollout/particle_free.rates`); integrator and bounces are SciPy's
-(Dormand and Prince, order 8, with events), so that a clip is no copy of the engine that fits it.
+The laws are the effects' (`particle_free.rates`, `particle_pendulum.Pendulum`); integrator and
+bounces are SciPy's (Dormand and Prince, order 8, with events), so that a clip is no copy of the
+engine that fits it.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.model.effects.air import expected_added_mass
-from galileo_jax.model.effects.effect import PENDULUM, Effect, Surroundings
-from galileo_jax.model.effects.laws import LAWS
+from galileo_jax.model.effects.effect import PENDULUM
 from galileo_jax.model.effects.laws.liquid import ADDED_MASS
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
-from galileo_jax.model.parameters import Parameter
-from galileo_jax.model.scene.scene import extents
 from galileo_jax.rollout.motion import dynamics
-from galileo_jax.rollout.particle_free import (
-    Body,
-    floor_of,
-    rates,
-    start_velocity,
-)
-from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value, with_given
-from galileo_jax.simulation.level import LevelTruth
+from galileo_jax.rollout.particle_free import Body, floor_of, rates, start_velocity
+from galileo_jax.rollout.particle_pendulum import Pendulum, Swing, make_pendulum
+from galileo_jax.simulation.hidden import with_given
 from galileo_jax.simulation.motion import RECORD_S, Motion
-from galileo_jax.simulation.pendulum import swung
+from galileo_jax.simulation.plane import PlaneTruth
 from galileo_jax.simulation.solver import PLASTIC_M_S
-from galileo_jax.simulation.to_event import Stretch, by_events
-from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
+from galileo_jax.simulation.truth import GRAVITY_M_S2
 
 WATER_KG_M3 = 998.0
 DRAG_COEFFICIENT = (0.4, 0.6)  # of a sphere, at Reynolds numbers of 1e3 to 1e5
-TOLERANCES = (1e-10, 1e-12)  # relative, absolute
+TOLERANCES, SWING_TOLERANCES = (1e-10, 1e-12), (1e-11, 1e-13)  # relative, absolute
 LONGEST_DELAY_S = 0.1
-# From weak to strong, in z: what a prior holds for likely.
-WEAK_Z, STRONG_Z = -0.5, 1.0
 
-
-@dataclass(frozen=True)
-class FreeTruth:
-    """One object that slides on nothing.
-
-    Attributes:
-      scenario: its name.
-      thing: name, shape, size and mass.
-      values: every parameter by name, those of `effects` too.
-      start_m: the centre at the start, (x, y).
-      seconds: how long it is looked at.
-      release_s: a fall is let go so long after the first frame.
-      effects: what is hidden in the clip.
-    """
-
-    scenario: str
-    thing: ClipObject
-    values: Mapping[str, float]
-    start_m: tuple[float, float]
-    seconds: float
-    release_s: float = 0.0
-    gravity: float = GRAVITY_M_S2
-    effects: tuple[Effect, ...] = field(default=())
-
-    @property
-    def surroundings(self) -> Surroundings:
-        """The scene as the laws see it."""
-        scenario = SCENARIOS[self.scenario]
-        half_length, half_height = extents(self.thing)
-        has_floor = "floor_restitution" in self.values
-        return Surroundings(
-            names=(self.thing.name,),
-            angle_rad=0.0 if scenario.moves_in_plane else math.pi / 2,
-            gravity=self.gravity,
-            half_length_m=(half_length,),
-            half_height_m=(half_height,),
-            corner_m=(math.inf,),
-            start_m=(self.start_m,),
-            start_path_m=(0.0,),
-            has_table=False,
-            comes_down=(False,),
-            has_surface=False,
-            moves_in_plane=scenario.moves_in_plane,
-            laws=(*scenario.laws, *(("floor",) if has_floor else ())),
-            expected=dict.fromkeys(NAMES, (0.0, 1.0)) | self._carried_air,
-        )
-
-    @property
-    def _carried_air(self) -> dict[str, tuple]:
-        """As the clip's yaml, with size and mass, will tell it; of a ball in a liquid nothing."""
-        size_m = self.thing.size_m
-        if self.scenario == "liquid" or size_m is None:
-            return {}
-        return expected_added_mass(size_m[0], self.values["m1"])
-
-
-NAMES = (*PLANE, *PATH, LENGTH, ANGLE, "rest", "period", "density_ratio", "floor_height")
+Drawn = tuple[dict[str, float], float, float]  # parameters, height of the start, seconds
 
 
 def draw_free(
     rng: np.random.Generator, scenario: str, given: Mapping[str, float], has_floor: bool
-) -> FreeTruth:
+) -> PlaneTruth:
     """Draws what `given` leaves open.
 
     Raises:
-      InputError: a given name is no parameter of the scenario, or it can have no floor.
+      InputError: a given name is no parameter of the scenario.
     """
-    if has_floor and "floor" not in SCENARIOS[scenario].keys:
-        raise InputError(f"--floor: there is none in scenario {scenario}")
-    draw = DRAWS[scenario]
     radius = round(float(rng.uniform(0.015, 0.04)), 3)
-    drawn, top_m, seconds = draw(rng, radius, given)
+    drawn, top_m, seconds = DRAWS[scenario](rng, radius, given)
     values = {"m1": float(np.exp(rng.uniform(np.log(0.05), np.log(0.3)))), **drawn}
     if has_floor:
         values |= {"floor_restitution": rng.uniform(0.5, 0.85), "floor_height": radius}
@@ -125,11 +54,7 @@ def draw_free(
     values = with_given(scenario, values, given)
     release = float(rng.uniform(0.0, LONGEST_DELAY_S)) if scenario == "fall" else 0.0
     thing = ClipObject(name="object1", shape="sphere", size_m=(radius,), mass_kg=values["m1"])
-    return FreeTruth(scenario, thing, values, (0.0, top_m), seconds + release, release)
-
-
-Truth = TypeVar("Truth", FreeTruth, LevelTruth)
-Drawn = tuple[dict[str, float], float, float]  # parameters, height of the start, seconds
+    return PlaneTruth(scenario, (thing,), values, ((0.0, top_m),), seconds + release, release)
 
 
 def _fall(rng: np.random.Generator, radius: float, given: Mapping[str, float]) -> Drawn:
@@ -187,46 +112,19 @@ DRAWS = {
 }
 
 
-def hide_free(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
-    """Puts an effect into a truth; what is not given is drawn from its prior.
-
-    A strength from 0 (weak) to 1 (strong) says where in the prior the first parameter is.
-
-    Raises:
-      InputError: the effect has no place in the scenario, or no such parameter.
-    """
-    effect, given, strength = hidden
-    parameters = effect.parameters(truth.surroundings)
-    if effect.name in SCENARIOS[truth.scenario].without or not parameters:
-        raise InputError(f"--effect: {effect.name} has no place in scenario {truth.scenario}")
-    check_parameters(effect, given, parameters)
-    share = {parameters[0].name: strength}
-    drawn = {p.name: given.get(p.name, _drawn(p, rng, share.get(p.name))) for p in parameters}
-    return replace(truth, values={**truth.values, **drawn}, effects=(*truth.effects, effect))
-
-
-def _drawn(parameter: Parameter, rng: np.random.Generator, share: float | None) -> float:
-    """From weak (share 0) to strong (1) in the prior; None draws the share."""
-    z = rng.uniform(WEAK_Z, STRONG_Z)
-    if share is not None:
-        z = WEAK_Z + share * (STRONG_Z - WEAK_Z)
-    return prior_value(parameter, z)
-
-
-def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
+def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
     """The motion from the release on, and when it bounces, s."""
     scene = truth.surroundings
-    theta = {name: np.asarray(value) for name, value in truth.values.items()}
-    effects = (*(e for e in truth.effects if e.name not in DECLARED_WRONGLY), *LAWS)
-    if PENDULUM in scene.laws:
-        return swung(effects, theta, scene, truth.seconds), ()
+    theta, effects = truth.theta, truth.laws
     law = dynamics(effects, scene, theta, np)
+    times = RECORD_S * np.arange(round(truth.seconds / RECORD_S) + 2)
+    if PENDULUM in scene.laws:
+        return _swung(make_pendulum(effects, theta, scene, law), times), ()
     floor = floor_of(effects, theta, scene)
     velocity = start_velocity(effects, theta, scene)
     if velocity is None:
         tangent = np.stack([np.cos(law.ramp_rad), -np.sin(law.ramp_rad)])
         velocity = law.start_speed_m_s[:, None] * tangent
-    times = RECORD_S * np.arange(round(truth.seconds / RECORD_S) + 2)
 
     def stretch(_: float, state: np.ndarray, is_bounce: bool) -> Stretch:
         now, rests = state.copy(), False
@@ -246,7 +144,108 @@ def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
 
         return Stretch(now, change, touch)
 
-    start = np.array([*truth.start_m, *velocity[0], 0.0])
+    start = np.array([*truth.start_m[0], *velocity[0], 0.0])
     rows, _, bounces = by_events(stretch, start, times, TOLERANCES)
     position, speed = rows[:, :2].T[None], rows[:, 2:4].T[None]
     return Motion(times, position, speed, np.zeros((1, len(times)))), bounces
+
+
+def _swung(pendulum: Pendulum, times: np.ndarray) -> Motion:
+    """The motion of a pendulum, from one turning back to the next."""
+
+    def stretch(began: float, state: np.ndarray, is_turned: bool) -> Stretch:
+        now = np.array([state[0], 0.0 if is_turned else state[1]])
+        pulled, excess = pendulum.rates(Swing(*now), np.asarray(began), 0.0)
+        way = np.sign(now[1]) or (np.sign(pulled.turning_rad_s) if excess > 0 else 0.0)
+        slip = way if pendulum.has_friction else 0.0
+
+        def change(t: float, y: np.ndarray) -> np.ndarray:
+            if way == 0.0:
+                return np.zeros(2)
+            return np.hstack(pendulum.rates(Swing(*y), np.asarray(t), slip)[0])
+
+        def turn(t: float, y: np.ndarray) -> float:
+            return float(y[1] * way) if slip and t > began else 1.0
+
+        return Stretch(now, change, turn)
+
+    swings, changes, _ = by_events(
+        stretch, np.array(pendulum.first, float), times, SWING_TOLERANCES
+    )
+    seen = [
+        pendulum.place(Swing(*swing), change(time, swing)[1])
+        for time, swing, change in zip(times, swings, changes, strict=True)
+    ]
+    position, velocity = (np.array(values).T[None] for values in zip(*seen, strict=True))
+    return Motion(times, position, velocity, np.zeros((1, len(times))))
+
+
+class Stretch(NamedTuple):
+    """How a motion goes on, up to its next event.
+
+    Attributes:
+      state: where it begins.
+      change: time and state to the state's rate.
+      event: time and state to what falls through zero at the event.
+    """
+
+    state: np.ndarray
+    change: Callable[[float, np.ndarray], np.ndarray]
+    event: Callable[[float, np.ndarray], float]
+
+
+class Integrated(NamedTuple):
+    """A motion.
+
+    Attributes:
+      states: `[time, number]`.
+      changes: `[time]`, what moved it then, as of `Stretch`.
+      events_s: when there was an event.
+    """
+
+    states: np.ndarray
+    changes: list[Callable[[float, np.ndarray], np.ndarray]]
+    events_s: tuple[float, ...]
+
+
+def by_events(
+    stretch: Callable[[float, np.ndarray, bool], Stretch],
+    state: np.ndarray,
+    times_s: np.ndarray,
+    tolerances: tuple[float, float],
+) -> Integrated:
+    """The motion at some times, from event to event (Dormand and Prince, order 8).
+
+    Args:
+      stretch: of time, state, and whether an event is there, which it carries out.
+      state: at the first of the times.
+      times_s: `[time]`.
+      tolerances: relative, absolute.
+    """
+    states, changes, events = np.empty((len(times_s), len(state))), [], []
+    begin, time = 0, float(times_s[0])
+    while begin < len(times_s):
+        begins, change, event = stretch(time, state, bool(events))
+
+        def falls(t: float, y: np.ndarray, event=event) -> float:
+            return event(t, y)
+
+        falls.terminal, falls.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
+        found = solve_ivp(
+            change,
+            (time, times_s[-1]),
+            begins,
+            method="DOP853",
+            dense_output=True,
+            events=falls,
+            rtol=tolerances[0],
+            atol=tolerances[1],
+        )
+        until = int(np.searchsorted(times_s, found.t[-1] + 1e-12))
+        states[begin:until] = found.sol(times_s[begin:until]).T
+        changes += [change] * (until - begin)
+        begin, time, state = until, float(found.t[-1]), found.y[:, -1]
+        if found.status != 1:
+            break
+        events.append(time)
+    return Integrated(states, changes, tuple(events))

@@ -6,21 +6,19 @@ within a step, so that a clip is no copy of the engine that fits it.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.model.effects.effect import Effect, Surroundings
-from galileo_jax.model.effects.laws import LAWS
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.laws.walls import ENDS as WALL_ENDS
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.simulation.hidden import with_given
-from galileo_jax.simulation.level_hits import Point, Rails, Rims, next_hit, strike, strike_wall
+from galileo_jax.simulation.level_hits import Rails, Rims, next_hit, strike, strike_wall
 from galileo_jax.simulation.motion import Motion
-from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
+from galileo_jax.simulation.plane import PlaneTruth
+from galileo_jax.simulation.truth import GRAVITY_M_S2
 
 STEP_S, STEPS_PER_RECORD = 1e-4, 2
 LONGEST_S = 4.0
@@ -30,53 +28,9 @@ ROOM_M = (0.01, 0.06)  # between a puck's start and the wall behind it
 SCENARIO = "from_above"
 
 
-@dataclass(frozen=True)
-class LevelTruth:
-    """Pucks, the first of which is pushed.
-
-    Attributes:
-      things: names, shapes and sizes.
-      values: every parameter by name, those of `effects` too.
-      start_m: `[object]`, (x, y) of the centres at the start.
-      effects: what is hidden in the clip.
-      walls_m: the ends of every wall.
-    """
-
-    things: tuple[ClipObject, ...]
-    values: Mapping[str, float]
-    start_m: tuple[tuple[float, float], ...]
-    effects: tuple[Effect, ...] = field(default=())
-    scenario: str = SCENARIO
-    gravity: float = GRAVITY_M_S2
-    walls_m: tuple[tuple[Point, Point], ...] = ()
-
-    @property
-    def surroundings(self) -> Surroundings:
-        """The scene as the laws see it."""
-        count = len(self.things)
-        radii = tuple((item.size_m or (math.nan,))[0] for item in self.things)
-        moving = [f"{name}1" for name in START]
-        return Surroundings(
-            names=tuple(item.name for item in self.things),
-            angle_rad=0.0,
-            gravity=self.gravity,
-            half_length_m=radii,
-            half_height_m=radii,
-            corner_m=(math.inf,) * count,
-            start_m=tuple((x, y, 0.0) for x, y in self.start_m),
-            start_path_m=(0.0,) * count,
-            has_table=False,
-            comes_down=(False,) * count,
-            moves_in_plane=True,
-            laws=("pucks", "walls") if self.walls_m else ("pucks",),
-            expected=dict.fromkeys([*moving, OFFSET], (0.0, 1.0)),
-            walls_m=self.walls_m,
-        )
-
-
 def draw_level(
     rng: np.random.Generator, given: Mapping[str, float], has_walls: bool = False
-) -> LevelTruth:
+) -> PlaneTruth:
     """Draws two pucks, the first on its way to the second, with what `given` leaves open.
 
     Where there are walls, four of them stand round the pucks, nearer than these can go.
@@ -119,21 +73,20 @@ def draw_level(
     )
     start = ((0.0, 0.0), (round(x, 4), round(y, 4)))
     if not has_walls:
-        return LevelTruth(things, values, start)
+        return PlaneTruth(SCENARIO, things, values, start)
     room = radii.max() + rng.uniform(*ROOM_M, 4)
     low, high = np.min(start, axis=0) - room[:2], np.max(start, axis=0) + room[2:]
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     corners = [(round(float(x), 4), round(float(y), 4)) for x, y in corners]
     walls = tuple(zip(corners, corners[1:] + corners[:1], strict=True))
     values |= {f"wall_offset_{end}{i + 1}": 0.0 for i in range(len(walls)) for end in WALL_ENDS}
-    return LevelTruth(things, values, start, walls_m=walls)
+    return PlaneTruth(SCENARIO, things, values, start, walls_m=walls)
 
 
-def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
+def solve_level(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
     """The motion, the turning as `pitch_rad`, and when pucks hit each other, s."""
     scene = truth.surroundings
-    theta: dict[str, Any] = {name: np.asarray(value) for name, value in truth.values.items()}
-    effects = (*(e for e in truth.effects if e.name not in DECLARED_WRONGLY), *LAWS)
+    theta, effects = truth.theta, truth.laws
     law = dynamics(effects, scene, theta, np)
     radii = np.array(scene.half_length_m)
     count = len(radii)

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from galileo_jax.rollout.motion import Dynamics
+from galileo_jax.simulation.plane import Point
 from galileo_jax.simulation.solver import PLASTIC_M_S
 
 FAN_RAD, NUM_FAN, FAN_TIMES = 0.5, 41, 5  # directions that are tried, finer each time
 CLOSES_M = 1e-9  # within a step, what is about to meet
-
-Point = tuple[float, float]
 
 
 class Rims(NamedTuple):

@@ -1,6 +1,6 @@
 """How the objects of a truth move."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -135,12 +135,10 @@ def _roll_out_free(truth: Truth, seconds: float) -> Motion:
     import jax
 
     from galileo_jax.model.model import SUBSTEPS, Model
-    from galileo_jax.model.scene.scene import compile_scene
+    from galileo_jax.model.scene.scene import Scene
     from galileo_jax.rollout.engine_c_free import EngineCFree
 
-    shapes = [each.shape for each in truth.objects]
-    scene = compile_scene(truth.surroundings, shapes, truth.objects)
-    scene = replace(scene, timestep_s=RECORD_S / SUBSTEPS)
+    scene = Scene(truth.surroundings, truth.objects, RECORD_S / SUBSTEPS)
     model = Model(scene, seconds, truth.motion_effects, nuisances=(), motion="free")
     with jax.enable_x64(True):
         poses = EngineCFree(model).poses(np.array([[truth.theta[name] for name in model.names]]))

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.simulation.declared import Declared
-from galileo_jax.simulation.free import FreeTruth
-from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.plane import PlaneTruth
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.simulation.truth import Truth
 
@@ -63,7 +62,7 @@ def truth_record(
 
 
 def plane_record(
-    name: str, settings: Settings, truth: FreeTruth | LevelTruth, frames: Motion
+    name: str, settings: Settings, truth: PlaneTruth, frames: Motion
 ) -> dict[str, Any]:
     """As `truth_record`, of what is on no ramp, without its events."""
     scene = truth.surroundings

@@ -57,22 +57,38 @@ class Term:
 
 
 TERMS: Registry[Term] = Registry("imperfection", "imperfections", "galileo_jax.statespace.terms")
-register = TERMS.register
+FromSeen = Callable[[Seen], Patterns | None]
 
 
-def none(seen: Seen) -> Patterns:
-    """An empty batch of patterns."""
-    return np.zeros((0, *seen.observation.position_m.shape))
+def term(
+    name: str,
+    meaning: str,
+    unit: str,
+    median: Callable[[Seen], float],
+    factor: float,
+    is_of_marks: bool = False,
+) -> Callable[[FromSeen], FromSeen]:
+    """Decorates a function that makes a term's patterns; it returns None where it has no place."""
+
+    def registered(made: FromSeen) -> FromSeen:
+        def patterns(seen: Seen) -> Patterns:
+            found = made(seen)
+            return np.zeros((0, *seen.observation.position_m.shape)) if found is None else found
+
+        TERMS.register(Term(name, meaning, unit, median, factor, patterns, is_of_marks))
+        return made
+
+    return registered
 
 
 def along_path(
-    covariance: Float[np.ndarray, "frame object frame object"], motion: Kinematics, seen: Seen
-) -> Patterns:
+    covariance: Float[np.ndarray, "frame object frame object"], motion: Kinematics
+) -> Patterns | None:
     """Patterns of deviations along the path, of which `covariance` is that of all bodies, m^2."""
     frames, count = covariance.shape[:2]
     flat = covariance.reshape(frames * count, -1)
     if not flat.any():
-        return none(seen)
+        return None
     patterns = random_patterns(flat, SMALLEST).reshape(-1, frames, count)
     return np.einsum("mto,oat->moat", patterns, motion.tangent)
 

@@ -14,7 +14,7 @@ from flax import nnx
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import PRESETS, Arrays
 from galileo_jax.rollout.engines import make_engine
@@ -166,5 +166,4 @@ def _model(frames: int) -> Model:
         release_m=RELEASE_M,
         object2_x_m=OBJECT2_M,
     )
-    scene = compile_scene(truth.surroundings, ["box", "box"], (first, second))
-    return Model(scene, frames / FPS, nuisances=())
+    return Model(Scene(truth.surroundings, truth.objects), frames / FPS, nuisances=())

@@ -22,7 +22,8 @@ from galileo_jax.model.scene.expected import expected
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
+from galileo_jax.simulation.free import draw_free, solve_free
+from galileo_jax.simulation.plane import PlaneTruth
 from tests.precision import in_64_bit
 
 G, MASS_KG, RADIUS_M, FPS, FRAMES = 9.81, 0.05, 0.03, 30, 60
@@ -69,7 +70,7 @@ def integrated(scenario: str, top_m: float, **values: float) -> np.ndarray:
     """What SciPy makes of the same laws, at the frames."""
     thing = draw_free(np.random.default_rng(0), scenario, {}, False).thing
     values = {"m1": MASS_KG, **values}
-    motion, _ = solve_free(FreeTruth(scenario, thing, values, (0.0, top_m), TIMES_S[-1]))
+    motion, _ = solve_free(PlaneTruth(scenario, (thing,), values, ((0.0, top_m),), TIMES_S[-1]))
     return motion.at(TIMES_S).position_m[0]
 
 

@@ -32,7 +32,7 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.toss_flight import flight_of, resting_height_m
 from galileo_jax.observation.poses import Poses
 from galileo_jax.rollout.body import box, thrown
-from galileo_jax.rollout.engine_body import roll_out_batch
+from galileo_jax.rollout.engine_body import roll_out
 from galileo_jax.runtime.errors import InputError
 from tests.precision import in_64_bit
 
@@ -84,7 +84,7 @@ def tosses(tmp_path_factory) -> list[Path]:
         start = jax.tree.map(lambda *values: jnp.stack(values), *starts)
         solids = jax.tree.map(lambda value: jnp.stack([value] * count), solid)
         steps = jnp.full((count, FRAMES), 1 / FPS)
-        poses = jax.tree.map(np.asarray, roll_out_batch(solids, start, steps))
+        poses = jax.tree.map(np.asarray, jax.jit(jax.vmap(roll_out))(solids, start, steps))
     return [
         write(
             folder / f"toss{i}.csv",

@@ -7,7 +7,7 @@ import numpy as np
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.model.scene.scene import Scene
 from tests.rollout.objects import scene_of
 
 SIDE_M = 0.06
@@ -30,8 +30,7 @@ def model_of(
 ) -> Model:
     """The model of bodies that move freely."""
     scene.setdefault("beyond_m", [0.25, 0.36][: len(objects) - 1])
-    shapes = [each.shape for each in objects]
-    compiled = compile_scene(scene_of(objects, **scene), shapes, tuple(objects))
+    compiled = Scene(scene_of(objects, **scene), tuple(objects))
     return Model(compiled, duration_s, effects, motion="free")
 
 

@@ -9,7 +9,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import compile_scene, extents, rolling, start_paths
+from galileo_jax.model.scene.scene import Scene, extents, rolling, start_paths
 from galileo_jax.rollout.engine_path import EnginePath
 
 BOX = ClipObject(name="box", shape="box", size_m=(0.06, 0.06, 0.06))
@@ -50,8 +50,7 @@ def scene_of(
 
 def model_of(objects: Sequence[ClipObject], surroundings: Surroundings, duration_s: float) -> Model:
     """The model with its nuisances."""
-    shapes = [each.shape for each in objects]
-    return Model(compile_scene(surroundings, shapes, tuple(objects)), duration_s)
+    return Model(Scene(surroundings, tuple(objects)), duration_s)
 
 
 def theta_of(

@@ -5,8 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.parameters import PriorTable
-from galileo_jax.rollout.rollout import Engine, at_times, in_jax
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Engine, Trajectory, at_times, in_jax
 
 
 def rolled(engine: Engine, z: jax.Array | np.ndarray) -> Trajectory:

@@ -86,7 +86,7 @@ def test_a_rollout_lasts_until_nobody_looks(model):
     engine, theta = EnginePath(model), thetas(model, 2)
     whole, speed = engine.simulate(theta)
     until = np.array([0.2, 0.3])
-    short, its_speed = engine.rolled(theta, until)
+    short, its_speed = engine.each(theta, until, lambda _, *motion: motion)
     seen = int(until.max() / model.record_dt_s) + 2
     np.testing.assert_array_equal(short[..., :seen], whole[..., :seen])
     np.testing.assert_array_equal(its_speed[..., :seen], speed[..., :seen])

@@ -1,5 +1,6 @@
 """The body engine: conservation laws, closed forms, slopes, and MuJoCo's C engine."""
 
+import functools
 import math
 from typing import Any
 
@@ -17,13 +18,12 @@ from galileo_jax.rollout.body import (
     Solid,
     box,
     climbs_m_s,
-    energy_j_kg,
     gaps_m,
     levers_m,
     spin_rad_s,
     thrown,
 )
-from galileo_jax.rollout.engine_body import roll_out, roll_out_batch, substeps_for
+from galileo_jax.rollout.engine_body import roll_out
 from tests.precision import in_64_bit
 
 mujoco: Any = mujoco_stubs  # its stubs lack what is used here
@@ -33,6 +33,18 @@ STEPS_S = np.full(FRAMES, 1 / FPS)
 TURNED = np.array([0.3, 0.5, 0.2, 0.7])
 PARTS_WITHIN = 0.015  # of an impulse, where slip turns or ends on the way: parts are finite
 SOFT_M = 0.002  # MuJoCo's contacts give way, and its impacts take a few steps
+
+
+@functools.partial(jax.jit, static_argnames=("substeps",))
+def roll_out_batch(solid: Solid, start: Pose, steps_s: jax.Array, substeps: int = 4) -> Pose:
+    return jax.vmap(functools.partial(roll_out, substeps=substeps))(solid, start, steps_s)
+
+
+def energy_j_kg(solid: Solid, pose: Pose) -> jax.Array:
+    """Kinetic and potential energy over the mass."""
+    turning = pose.momentum_m2_s @ spin_rad_s(solid, pose)
+    high = solid.gravity * (pose.position_m[2] - solid.floor_m)
+    return 0.5 * (pose.velocity_m_s @ pose.velocity_m_s + turning) + high
 
 
 @pytest.fixture(autouse=True)
@@ -208,11 +220,6 @@ def test_mujoco_says_the_same():
     hit = int(np.argmax(of_all(gaps_m, solid, poses).min(axis=1) < 1e-3))
     assert apart[: hit + 10].max() < SOFT_M, apart
     assert 3 < hit < 30
-
-
-def test_steps_are_short_enough():
-    assert substeps_for(1 / 148) == 4
-    assert substeps_for(1 / 1000) == 1
 
 
 def struck(solid: Solid, quaternion, velocity, spin) -> tuple[Pose, Pose, np.ndarray]:

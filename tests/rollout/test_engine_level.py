@@ -1,6 +1,7 @@
 """Discs on a level table: closed forms, conservation, slopes, and the finely stepped solver."""
 
 import math
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -11,9 +12,10 @@ from scipy.spatial import KDTree
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.rollout.disc_hits import Rim, facing
 from galileo_jax.rollout.engine_particle import roll_out
-from galileo_jax.rollout.oval_rims import Rim, facing
-from galileo_jax.simulation.level import LevelTruth, draw_level, solve_level
+from galileo_jax.simulation.level import draw_level, solve_level
+from galileo_jax.simulation.plane import PlaneTruth
 
 DT_S = 1 / 240
 G = 9.81
@@ -22,21 +24,21 @@ ROLL_OUT = jax.jit(roll_out, static_argnums=(0, 1, 2, 3))
 FINE_M = 2e-4  # of the solver's steps of 0.1 ms
 
 
-def truth(seed: int = 0, **values: float) -> LevelTruth:
+def truth(seed: int = 0, **values: float) -> PlaneTruth:
     return draw_level(np.random.default_rng(seed), values)
 
 
-def rolled(one: LevelTruth, seconds: float, names=None, theta=None):
+def rolled(one: PlaneTruth, seconds: float, names=None, theta=None):
     names = tuple(one.values) if names is None else names
     theta = jnp.asarray([one.values[name] for name in names]) if theta is None else theta
     records = round(seconds / DT_S) + 1
     return ROLL_OUT((*one.effects, *LAWS), names, records, DT_S, theta, one.surroundings)
 
 
-def alone(**values: float) -> LevelTruth:
+def alone(**values: float) -> PlaneTruth:
     """The first puck, and another that it passes far away."""
     far = truth(start_velocity_x1=1.0, start_velocity_y1=0.0, **values)  # pyright: ignore[reportArgumentType]
-    return LevelTruth(far.things, far.values, ((0.0, 0.0), (0.0, -1.0)))
+    return replace(far, start_m=((0.0, 0.0), (0.0, -1.0)))
 
 
 @pytest.mark.usefixtures("x64")
@@ -69,7 +71,7 @@ def test_equal_pucks_head_on_exchange_their_speeds() -> None:
         start_velocity_y1=0.0,
         start_turning1=0.0,
     )
-    one = LevelTruth(drawn.things, drawn.values, ((0.0, 0.0), (0.3, 0.0)))
+    one = replace(drawn, start_m=((0.0, 0.0), (0.3, 0.0)))
     _, velocity = rolled(one, 1.0)
     assert velocity[0, :, -1] == pytest.approx([0, 0, 0], abs=1e-3)
     assert velocity[1, :, -1] == pytest.approx([1, 0, 0], abs=1e-3)
@@ -112,13 +114,13 @@ def test_agrees_with_the_fine_solver(seed: int) -> None:
 
 def beside(
     ends: tuple[tuple[float, float], tuple[float, float]], wall_restitution: float, **values: float
-) -> LevelTruth:
+) -> PlaneTruth:
     """The first puck alone with a wall; the other one is far away and lies still."""
     grip = values.pop("wall_grip", 0.0)
     one = alone(**values)
     walls = {"wall_restitution": wall_restitution, "wall_grip": grip}
     walls |= {f"wall_offset_{end}1": 0.0 for end in ("from", "to")}
-    return LevelTruth(one.things, {**one.values, **walls}, one.start_m, walls_m=(ends,))
+    return replace(one, values={**one.values, **walls}, walls_m=(ends,))
 
 
 @pytest.mark.usefixtures("x64")
@@ -161,12 +163,10 @@ def test_what_passes_beside_a_wall_or_is_slow_does_not_bounce() -> None:
     free = rolled(alone(k1=0.1), 1.0)[0]
     assert np.asarray(ended) == pytest.approx(np.asarray(free), abs=1e-12)
     one = beside(((0.2, -1.0), (0.2, 1.0)), 0.9, k1=0.1, start_turning1=0.0)
-    tilted = LevelTruth(
-        one.things,
-        {**one.values, "table_tilt": 0.15, "table_tilt_y": 0.0},
-        one.start_m,
-        make_effects(["table_tilt"]),
-        walls_m=one.walls_m,
+    tilted = replace(
+        one,
+        values={**one.values, "table_tilt": 0.15, "table_tilt_y": 0.0},
+        effects=make_effects(["table_tilt"]),
     )
     place, speed = rolled(tilted, 4.0)  # slides down against the wall, and stays there
     radius = (one.things[0].size_m or (0.0,))[0]
@@ -175,12 +175,12 @@ def test_what_passes_beside_a_wall_or_is_slow_does_not_bounce() -> None:
     assert np.abs(np.asarray(speed[0, :2, -1])).max() < 0.02
 
 
-def uneven(one: LevelTruth, *shares: float) -> LevelTruth:
+def uneven(one: PlaneTruth, *shares: float) -> PlaneTruth:
     """With the pressure's centres of both pucks beside the middle, x and y of each."""
     names = [f"uneven_pressure_{axis}{i}" for i in (1, 2) for axis in "xy"]
     values = {**one.values, **dict(zip(names, shares, strict=True))}
     effects = make_effects(["uneven_pressure"])
-    return LevelTruth(one.things, values, one.start_m, effects, walls_m=one.walls_m)
+    return replace(one, values=values, effects=effects)
 
 
 @pytest.mark.usefixtures("x64")
@@ -219,12 +219,12 @@ def test_uneven_pressure_agrees_with_the_fine_solver(seed: int) -> None:
     assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 5e-3
 
 
-def oval(one: LevelTruth, *shares: float) -> LevelTruth:
+def oval(one: PlaneTruth, *shares: float) -> PlaneTruth:
     """With rims that are not round, c and s of each."""
     names = [f"oval_rim_{part}{i}" for i in (1, 2) for part in "cs"]
     values = {**one.values, **dict(zip(names, shares, strict=True))}
     effects = make_effects(["oval_rim"])
-    return LevelTruth(one.things, values, one.start_m, effects, walls_m=one.walls_m)
+    return replace(one, values=values, effects=effects)
 
 
 def outline(radius: float, c: float, s: float) -> np.ndarray:
@@ -269,7 +269,7 @@ def test_an_oval_rim_turns_what_it_hits_without_grip() -> None:
         start_velocity_y1=0.0,
         start_turning1=0.0,
     )
-    one = LevelTruth(drawn.things, drawn.values, ((0.0, 0.0), (0.3, 0.0)))
+    one = replace(drawn, start_m=((0.0, 0.0), (0.3, 0.0)))
     position, velocity = (np.asarray(each) for each in rolled(oval(one, 0.0, 0.04, 0.0, 0.0), 1.0))
     masses = np.array([one.values["m1"], one.values["m2"]])
     radii = np.array([(item.size_m or (0.0,))[0] for item in one.things])
@@ -340,7 +340,7 @@ def test_effects_agree_with_the_fine_solver(name: str) -> None:
     scene = one.surroundings
     given = {"table_tilt": 0.02, "table_tilt_y": -0.01, "stribeck": 0.5, "stribeck_speed": 0.3}
     values = {p.name: given.get(p.name, 0.05) for e in effects for p in e.parameters(scene)}
-    changed = LevelTruth(one.things, {**one.values, **values}, one.start_m, effects)
+    changed = replace(one, values={**one.values, **values}, effects=effects)
     motion, _ = solve_level(changed)
     position, _ = rolled(changed, 1.0)
     fine = motion.at(DT_S * np.arange(position.shape[-1]))

@@ -13,8 +13,7 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import PriorTable, inverse
 from galileo_jax.rollout.engine_path import EnginePath, roll_out
 from galileo_jax.rollout.motion import LEAST_FRICTION
-from galileo_jax.rollout.rollout import JUMP_M_S2, at_times
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import JUMP_M_S2, Trajectory, at_times
 from tests.ramp_model import HIT, make_model, make_theta
 from tests.reference_ramp import Experiment, solve
 from tests.rollout.rolled import derivatives, rolled

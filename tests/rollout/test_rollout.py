@@ -9,8 +9,7 @@ from galileo_jax.model.effects.effect import Theta
 from galileo_jax.model.parameters import PriorTable, inverse
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import at_times
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Trajectory, at_times
 from galileo_jax.runtime.errors import InputError
 from tests.ramp_model import HIT, make_model, make_theta
 from tests.rollout.rolled import rolled

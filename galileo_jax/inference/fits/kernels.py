@@ -14,7 +14,7 @@ import numpy as np
 from galileo_jax.inference.problem import seen
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.parameters import PriorTable
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Trajectory
 from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 

@@ -377,7 +377,7 @@ class Effect:
         """Returns how far from round the rims of discs are that are seen from above, or None.
 
         c and s of the second harmonic of how far they reach, as shares of their radii
-        (`rollout/oval_rims.py`), when the discs are first seen: `[..., object, 2]`.
+        (`rollout/disc_hits.py`), when the discs are first seen: `[..., object, 2]`.
         """
         return None
 

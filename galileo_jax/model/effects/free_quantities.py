@@ -8,17 +8,12 @@ from collections.abc import Sequence
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.registry import Registry, entry_names
+from galileo_jax.runtime.registry import Registry
 
-PACKAGE = "galileo_jax.model.effects.free"
-
-_registry: Registry[type[Effect]] = Registry("quantity", "quantities", PACKAGE)
+_registry: Registry[type[Effect]] = Registry(
+    "quantity", "quantities", "galileo_jax.model.effects.free"
+)
 register = _registry.register
-
-
-def free_quantity_names() -> tuple[str, ...]:
-    """What may be inferred, sorted; nothing is imported."""
-    return entry_names(PACKAGE)
 
 
 def make_free_quantities(names: Sequence[str]) -> tuple[Effect, ...]:

@@ -21,8 +21,7 @@ from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.scene.board_path import board_shape
 from galileo_jax.model.scene.level_starts import level_starts
-from galileo_jax.model.scene.pendulum_expected import pendulum_expected
-from galileo_jax.model.scene.period import period_s
+from galileo_jax.model.scene.pendulum_expected import pendulum_expected, period_s
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many

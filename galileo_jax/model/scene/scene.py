@@ -44,13 +44,11 @@ class Scene:
 
     Attributes:
       surroundings: names, geometry and start, as effects see them.
-      shapes: `[object]`, what is drawn of each.
       objects: as declared.
       timestep_s: of MuJoCo's engines.
     """
 
     surroundings: Surroundings
-    shapes: tuple[str, ...]
     objects: tuple[ClipObject, ...]
     timestep_s: float = TIMESTEP_S
 
@@ -66,7 +64,7 @@ class Scene:
 
     @cached_property
     def _compiled(self) -> "tuple[mujoco.MjSpec, mujoco.MjModel]":
-        spec = _spec(self.surroundings, self.shapes, self.objects)
+        spec = _spec(self.surroundings, self.objects)
         spec.option.timestep = self.timestep_s
         return spec, spec.compile()
 
@@ -77,6 +75,11 @@ class Scene:
         The planar scene has no use for it.
         """
         return tuple(each.z_m for each in self.objects)
+
+    @property
+    def shapes(self) -> tuple[str, ...]:
+        """`[object]`, what is drawn of each."""
+        return tuple(each.shape for each in self.objects)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -166,7 +169,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         expected=expected(clip, observation, half[0][int(not scenario.is_level)]),
         walls_m=tuple(wall.ends_m for wall in clip.walls),
     )
-    return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+    return Scene(surroundings, clip.objects)
 
 
 def _starts(
@@ -255,16 +258,7 @@ def _on_ramp(along: float, height: float, angle: float) -> tuple[float, float]:
     )
 
 
-def compile_scene(
-    surroundings: Surroundings, shapes: Sequence[str], declared: tuple[ClipObject, ...]
-) -> Scene:
-    """The scene of the given surroundings; its MuJoCo model is compiled when it is needed."""
-    return Scene(surroundings, tuple(shapes), declared[: len(surroundings.names)])
-
-
-def _spec(
-    surroundings: Surroundings, shapes: Sequence[str], declared: tuple[ClipObject, ...]
-) -> "mujoco.MjSpec":
+def _spec(surroundings: Surroundings, declared: tuple[ClipObject, ...]) -> "mujoco.MjSpec":
     import mujoco
 
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
@@ -301,7 +295,8 @@ def _spec(
                 bumper.pos = [forward * (length - BUMPER_RADIUS_M), 0, lift]
         shape = spec.geom(f"{name}_shape")
         rolls = declared[i].roll_inertia is not None
-        _draw(shape, "sphere" if rolls else shapes[i], declared[i], length, height)
+        kind = "sphere" if rolls else declared[i].shape
+        _draw(shape, kind, declared[i], length, height)
     if not has_table:
         for pair in list(spec.pairs):
             if "table" in (pair.geomname1, pair.geomname2):

@@ -3,17 +3,19 @@
 import numpy as np
 
 from galileo_jax.statespace.linear_sde import covariance, transitions
-from galileo_jax.statespace.term import Patterns, Seen, Term, none, of_axis, register
+from galileo_jax.statespace.term import Patterns, Seen, of_axis, term
 
 LASTS_S = 0.05
+MEANING = "accelerations vary by {size} for a twentieth of a second at a time"
 
 
-def _patterns(seen: Seen) -> Patterns:
+@term("gusts", MEANING, "m/s^2", median=lambda _: 0.02, factor=4.0)
+def gusts(seen: Seen) -> Patterns | None:
+    """Of each axis on its own; none on a surface, a spring or a thread."""
     scene, times = seen.scene, seen.observation.times_s
     if scene.has_surface or len(times) < 2 or {"spring", "pendulum"} & set(scene.laws):
-        return none(seen)
-    steps = len(times) - 1
-    drift, diffusion = np.zeros((2, steps, 3, 3))
+        return None
+    drift, diffusion = np.zeros((2, len(times) - 1, 3, 3))
     drift[:, 0, 1] = drift[:, 1, 2] = 1.0
     drift[:, 2, 2] = -1 / LASTS_S
     diffusion[:, 2, 2] = 2 / LASTS_S
@@ -21,15 +23,3 @@ def _patterns(seen: Seen) -> Patterns:
     way = transitions(drift, diffusion, np.diff(times))
     found = covariance(way, np.diag([0.0, 0.0, 1.0]), place)
     return of_axis(found[:, 0, :, 0], seen)
-
-
-register(
-    Term(
-        name="gusts",
-        meaning="accelerations vary by {size} for a twentieth of a second at a time",
-        unit="m/s^2",
-        median=lambda _: 0.02,
-        factor=4.0,
-        patterns=_patterns,
-    )
-)

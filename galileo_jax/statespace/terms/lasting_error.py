@@ -8,9 +8,11 @@ Source: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, 
 
 import numpy as np
 
-from galileo_jax.statespace.term import Patterns, Seen, Term, of_axis, register
+from galileo_jax.statespace.term import Patterns, Seen, of_axis, term
 
 LASTS, BRIEFLY = 1 / 3, 3.0  # of the track; rows
+LASTING = "the marks are off by {size} for a third of the time"
+BRIEF = "the marks are off by {size} for some frames"
 
 
 def way_m(seen: Seen) -> float:
@@ -28,27 +30,18 @@ def _smooth(seen: Seen, lasts_s: float) -> Patterns:
     return of_axis((1 + apart) * np.exp(-apart), seen)
 
 
-def _long(seen: Seen) -> Patterns:
+def _share_of_way_m(seen: Seen) -> float:
+    return 2e-4 * way_m(seen)
+
+
+@term("lasting_error", LASTING, "m", _share_of_way_m, factor=5.0, is_of_marks=True)
+def lasting_error(seen: Seen) -> Patterns:
+    """Over a third of the track."""
     return _smooth(seen, LASTS * float(np.ptp(seen.observation.times_s)))
 
 
-def _brief(seen: Seen) -> Patterns:
+@term("brief_error", BRIEF, "m", _share_of_way_m, factor=5.0, is_of_marks=True)
+def brief_error(seen: Seen) -> Patterns:
+    """Over three rows."""
     steps = np.diff(seen.observation.times_s)
     return _smooth(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))
-
-
-for name, meaning, patterns in (
-    ("lasting_error", "the marks are off by {size} for a third of the time", _long),
-    ("brief_error", "the marks are off by {size} for some frames", _brief),
-):
-    register(
-        Term(
-            name=name,
-            meaning=meaning,
-            unit="m",
-            median=lambda seen: 2e-4 * way_m(seen),
-            factor=5.0,
-            patterns=patterns,
-            is_of_marks=True,
-        )
-    )

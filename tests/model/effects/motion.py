@@ -14,10 +14,9 @@ from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.engine_path import EnginePath
-from galileo_jax.rollout.rollout import at_times
-from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.rollout.rollout import Trajectory, at_times
 from tests.ramp_model import HIT, make_model, make_surroundings, make_theta
 from tests.reference_ramp import Experiment
 
@@ -132,8 +131,7 @@ def film(experiment: Experiment, given: Mapping[str, float], times_s: np.ndarray
 def model_of(scene: Surroundings, names: tuple[str, ...], duration_s: float = 1.0) -> Model:
     """A model of given surroundings, not of an experiment (an incline)."""
     boxes = tuple(ClipObject(name=name, shape="box", size_m=(0.06,) * 3) for name in scene.names)
-    compiled = compile_scene(scene, ["box"] * len(boxes), boxes)
-    return Model(compiled, duration_s, make_effects(names))
+    return Model(Scene(scene, boxes), duration_s, make_effects(names))
 
 
 def absent_theta(model: Model, m: tuple[float, ...], k: tuple[float, ...]) -> np.ndarray:
