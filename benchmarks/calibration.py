@@ -44,10 +44,9 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.similarity.discrepancy import SCALE_SD
-from galileo_jax.simulation.like import truth_like
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.series import draw_series
-from galileo_jax.simulation.truth import Truth, draw_truth
+from galileo_jax.simulation.truth import Truth, draw_truth, truth_like
 
 ANGLES_DEG = (10.0, 30.0)
 NOISE_M = 2e-4

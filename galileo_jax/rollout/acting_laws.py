@@ -24,19 +24,12 @@ PACKAGE = f"{__name__.split('.')[0]}."
 
 @dataclass(frozen=True)
 class Law:
-    """An effect with a force or a friction law of its own, or rims that are not round.
-
-    Attributes:
-      effect: it.
-      kind: what its rollouts have.
-      columns: of its parameters in the model.
-      absent: their values where it does nothing.
-    """
+    """An effect with a force or a friction law of its own, or rims that are not round."""
 
     effect: Effect
-    kind: int
-    columns: np.ndarray
-    absent: np.ndarray
+    kind: int  # what its rollouts have
+    columns: np.ndarray  # of its parameters in the model
+    absent: np.ndarray  # their values where it does nothing
 
     def acts(self, theta: np.ndarray) -> np.ndarray:
         """Whether it acts in each of `theta` `[batch, parameter]`: `[batch]`."""
@@ -45,21 +38,13 @@ class Law:
 
 @dataclass(frozen=True)
 class Share:
-    """Part of a model.
+    """Part of a model."""
 
-    Attributes:
-      effects: that may act, nuisances among them.
-      names: of their parameters.
-      columns: where these stand among the model's.
-      laws: those of `effects` that do not act in every rollout.
-      places: where these stand among `effects`.
-    """
-
-    effects: tuple[Effect, ...]
-    names: tuple[str, ...]
-    columns: tuple[int, ...]
-    laws: tuple[Law, ...] = ()
-    places: tuple[int, ...] = ()
+    effects: tuple[Effect, ...]  # that may act, nuisances among them
+    names: tuple[str, ...]  # of their parameters
+    columns: tuple[int, ...]  # where these stand among the model's
+    laws: tuple[Law, ...] = ()  # those of `effects` that do not act in every rollout
+    places: tuple[int, ...] = ()  # where these stand among `effects`
 
     def of(self, theta: np.ndarray) -> np.ndarray:
         """Of `theta` `[batch, parameter]` the columns of `names`."""

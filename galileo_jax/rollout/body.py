@@ -15,42 +15,27 @@ from galileo_jax.rollout.events import runge_kutta
 
 
 class Solid(NamedTuple):
-    """A convex body, and the plane that it falls on.
+    """A convex body, and the plane that it falls on."""
 
-    Attributes:
-      corners_m: `[corner, 3]`, about the centre of mass, along the principal axes.
-      inertia_m2: `[3]`, principal moments of inertia over the mass.
-      friction: between corners and plane, of slipping and of impacts.
-      restitution: share of the speed against the plane with which a corner leaves it.
-      gravity: m/s^2.
-      floor_m: how high the plane is.
-      round_m: radius of the balls that corners end in, and edges and faces with them; their
-        centres are `corners_m`.
-    """
-
-    corners_m: Float[jax.Array, "corner 3"]
-    inertia_m2: Float[jax.Array, " 3"]
-    friction: Float[jax.Array, ""]
+    corners_m: Float[jax.Array, "corner 3"]  # about the centre of mass, along the principal axes
+    inertia_m2: Float[jax.Array, " 3"]  # principal moments of inertia over the mass
+    friction: Float[jax.Array, ""]  # between corners and plane, of slipping and of impacts
+    # Share of the speed against the plane with which a corner leaves it
     restitution: Float[jax.Array, ""]
-    gravity: Float[jax.Array, ""]
-    floor_m: Float[jax.Array, ""]
+    gravity: Float[jax.Array, ""]  # m/s^2
+    floor_m: Float[jax.Array, ""]  # how high the plane is
+    # Radius of the balls that corners end in, and edges and faces with them; their centres are
+    # `corners_m`
     round_m: Float[jax.Array, ""]
 
 
 class Pose(NamedTuple):
-    """A body at one instant.
+    """A body at one instant."""
 
-    Attributes:
-      position_m: `[3]`, its centre of mass.
-      quaternion: `[4]`.
-      velocity_m_s: `[3]`.
-      momentum_m2_s: `[3]`, angular momentum over the mass, along the world's axes.
-    """
-
-    position_m: Float[jax.Array, " 3"]
+    position_m: Float[jax.Array, " 3"]  # its centre of mass
     quaternion: Float[jax.Array, " 4"]
     velocity_m_s: Float[jax.Array, " 3"]
-    momentum_m2_s: Float[jax.Array, " 3"]
+    momentum_m2_s: Float[jax.Array, " 3"]  # angular momentum over the mass, along the world's axes
 
 
 def box(

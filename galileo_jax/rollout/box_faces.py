@@ -23,31 +23,19 @@ AROUND = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))  # the corners of 
 
 
 class Box(NamedTuple):
-    """A box in space.
-
-    Attributes:
-      centre_m: `[3]`.
-      turned: `[3, 3]`, from its axes to the world's.
-      half_m: `[3]`, half its edges.
-    """
+    """A box in space."""
 
     centre_m: Float[jax.Array, " 3"]
-    turned: Float[jax.Array, "3 3"]
-    half_m: Float[jax.Array, " 3"]
+    turned: Float[jax.Array, "3 3"]  # from its axes to the world's
+    half_m: Float[jax.Array, " 3"]  # half its edges
 
 
 class Touch(NamedTuple):
-    """Where a box touches another one.
+    """Where a box touches another one."""
 
-    Attributes:
-      points_m: `[point, 3]`, in the world.
-      gaps_m: `[point]`; `AFAR_M` of points that there are not.
-      normal: `[3]`, from the one to the other.
-    """
-
-    points_m: Float[jax.Array, "point 3"]
-    gaps_m: Float[jax.Array, " point"]
-    normal: Float[jax.Array, " 3"]
+    points_m: Float[jax.Array, "point 3"]  # in the world
+    gaps_m: Float[jax.Array, " point"]  # `[point]`; `AFAR_M` of points that there are not
+    normal: Float[jax.Array, " 3"]  # from the one to the other
 
 
 def touch(one: Box, other: Box) -> Touch:

@@ -16,7 +16,6 @@ Alart and Jean (1998), A Gauss-Seidel like algorithm to solve frictional contact
 Methods Appl. Mech. Eng. 155, 31.
 """
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -41,39 +40,24 @@ Carry = tuple[jax.Array, Speeds, jax.Array]
 
 
 class Corners(NamedTuple):
-    """The corners on which boxes stand.
+    """The corners on which boxes stand."""
 
-    Attributes:
-      levers_m: `[box, corner, 3]`, from the centres.
-      least_m_s: `[box, corner]`, least speed at which each may rise afterwards.
-      touches: `[box, corner]`, of which anything is asked.
-      friction: `[box]`.
-      guess_m_s: `[box, corner, 3]`, impulses over the mass with which the sweeps start.
-    """
-
-    levers_m: Float[jax.Array, "box corner 3"]
-    least_m_s: Float[jax.Array, "box corner"]
-    touches: Bool[jax.Array, "box corner"]
+    levers_m: Float[jax.Array, "box corner 3"]  # from the centres
+    least_m_s: Float[jax.Array, "box corner"]  # least speed at which each may rise afterwards
+    touches: Bool[jax.Array, "box corner"]  # of which anything is asked
     friction: Float[jax.Array, " box"]
+    # Impulses over the mass with which the sweeps start
     guess_m_s: Float[jax.Array, "box corner 3"]
 
 
 class Points(NamedTuple):
-    """The points at which one box touches another; the numbers of these are `boxes`.
+    """The points at which one box touches another; the numbers of these are `boxes`."""
 
-    Attributes:
-      levers_m: `[2, point, 3]`, from the two centres.
-      normal: `[3]`, from the first to the second.
-      least_m_s: `[point]`, least speed at which each opens afterwards.
-      touches: `[point]`.
-      guess_ns: `[point]`, impulses with which the sweeps start.
-    """
-
-    levers_m: Float[jax.Array, "2 point 3"]
-    normal: Float[jax.Array, " 3"]
-    least_m_s: Float[jax.Array, " point"]
+    levers_m: Float[jax.Array, "2 point 3"]  # from the two centres
+    normal: Float[jax.Array, " 3"]  # from the first to the second
+    least_m_s: Float[jax.Array, " point"]  # least speed at which each opens afterwards
     touches: Bool[jax.Array, " point"]
-    guess_ns: Float[jax.Array, " point"]
+    guess_ns: Float[jax.Array, " point"]  # impulses with which the sweeps start
 
 
 def after_impulses(
@@ -94,15 +78,13 @@ def after_impulses(
       mobility: from angular momentum over the mass to spin.
       inverse_kg: one over the masses.
     """
-    stands = jax.vmap(jax.vmap(_Corner.of, (0, 0, 0, None, None)), (0, 0, 0, 0, 0))(
-        corners.levers_m, corners.least_m_s, corners.touches, corners.friction, mobility
-    )
+    of_corner = jax.vmap(_Corner.of, (Corners._make((0, 0, 0, None, 0)), None))
+    stands = jax.vmap(of_corner)(corners, mobility)
     orders = [jnp.argsort(~of.touches, stable=True) for of in points]
     points = [_ordered(of, order) for of, order in zip(points, orders, strict=True)]
+    of_point = jax.vmap(_Point.of, (Points._make((1, None, 0, 0, 0)), None, None))
     pairs = [
-        jax.vmap(functools.partial(_Point.of, of.normal, both, mobility, inverse_kg), (1, 0, 0))(
-            of.levers_m, of.least_m_s, of.touches
-        )
+        of_point(of, mobility[jnp.asarray(both)], inverse_kg[jnp.asarray(both)])
         for of, both in zip(points, boxes, strict=True)
     ]
     standing = jnp.where(corners.touches[..., None], corners.guess_m_s, 0.0)
@@ -178,88 +160,58 @@ def _at_corner(stands: "_Corner") -> Callable[[jax.Array, Carry], Carry]:
 class _Corner(NamedTuple):
     """One corner on the table, per mass of its box."""
 
-    lever: jax.Array
+    at: Corners
     turns: jax.Array  # mobility times the cross product with the lever
     rises: jax.Array  # how fast a unit impulse makes it upwards
     slides: jax.Array  # and the most along the table
-    least: jax.Array
-    touches: jax.Array
-    friction: jax.Array
 
     @classmethod
-    def of(
-        cls,
-        lever: jax.Array,
-        least: jax.Array,
-        touches: jax.Array,
-        friction: jax.Array,
-        mobility: jax.Array,
-    ) -> "_Corner":
-        skew = _skew(lever)
+    def of(cls, at: Corners, mobility: jax.Array) -> "_Corner":
+        skew = jnp.cross(jnp.eye(3), at.levers_m)
         matrix = jnp.eye(3) - skew @ mobility @ skew
         a, b, c = matrix[0, 0], matrix[1, 1], matrix[0, 1]
         slides = 0.5 * (a + b) + jnp.sqrt(0.25 * (a - b) ** 2 + c**2 + TINY)
-        return cls(lever, mobility @ skew, matrix[2, 2], slides, least, touches, friction)
+        return cls(at, mobility @ skew, matrix[2, 2], slides)
 
     def swept(self, impulse: jax.Array, speeds: Speeds) -> tuple[jax.Array, Speeds]:
         """The change of its impulse, and the box' speeds after it."""
         velocity, spin = speeds
-        u = velocity + jnp.cross(spin, self.lever)
-        push = jnp.maximum(impulse[2] - (u[2] - self.least) / self.rises, 0.0)
+        u = velocity + jnp.cross(spin, self.at.levers_m)
+        push = jnp.maximum(impulse[2] - (u[2] - self.at.least_m_s) / self.rises, 0.0)
         wanted = impulse[:2] - u[:2] / self.slides
         size = jnp.sqrt(jnp.sum(wanted**2) + TINY)
-        rub = wanted * jnp.minimum(1.0, self.friction * push / size)
-        change = jnp.where(self.touches, jnp.append(rub, push), 0.0) - impulse
+        rub = wanted * jnp.minimum(1.0, self.at.friction * push / size)
+        change = jnp.where(self.at.touches, jnp.append(rub, push), 0.0) - impulse
         return change, Speeds(velocity + change, spin + self.turns @ change)
 
 
 class _Point(NamedTuple):
     """One point between two boxes: what a unit impulse does there to both, `[2, ...]`."""
 
+    at: Points
     arms: jax.Array  # levers x normal
     pushes: jax.Array  # velocities that it brings
     turns: jax.Array  # and spins
     moves: jax.Array  # one over the masses
     opens: jax.Array  # how fast it opens the point
-    normal: jax.Array
-    least: jax.Array
-    touches: jax.Array
 
     @classmethod
-    def of(
-        cls,
-        normal: jax.Array,
-        boxes: tuple[int, int],
-        mobility: jax.Array,
-        inverse_kg: jax.Array,
-        levers: jax.Array,
-        least: jax.Array,
-        touches: jax.Array,
-    ) -> "_Point":
-        at, sides = jnp.asarray(boxes), jnp.array([-1.0, 1.0])
-        arms, moves = jnp.cross(levers, normal), inverse_kg[at]
-        per_push = (sides * moves)[:, None]
-        turns = per_push * jnp.einsum("bij,bj->bi", mobility[at], arms)
-        opens = jnp.sum(moves) + jnp.sum(sides[:, None] * arms * turns)
-        return cls(
-            sides[:, None] * arms, per_push * normal, turns, moves, opens, normal, least, touches
-        )
+    def of(cls, at: Points, mobility: jax.Array, inverse_kg: jax.Array) -> "_Point":
+        sides, arms = jnp.array([-1.0, 1.0]), jnp.cross(at.levers_m, at.normal)
+        per_push = (sides * inverse_kg)[:, None]
+        turns = per_push * jnp.einsum("bij,bj->bi", mobility, arms)
+        opens = jnp.sum(inverse_kg) + jnp.sum(sides[:, None] * arms * turns)
+        return cls(at, sides[:, None] * arms, per_push * at.normal, turns, inverse_kg, opens)
 
     def swept(
         self, impulse: jax.Array, speeds: Speeds, boxes: jax.Array
     ) -> tuple[jax.Array, Speeds]:
         """The change of its impulse, and the boxes' speeds after it."""
         velocity, spin = speeds.velocity[boxes], speeds.spin[boxes]
-        u = (velocity[1] - velocity[0]) @ self.normal + jnp.sum(self.arms * spin)
-        new = jnp.maximum(impulse - (u - self.least) / self.opens, 0.0)
-        change = jnp.where(self.touches, new, 0.0) - impulse
+        u = (velocity[1] - velocity[0]) @ self.at.normal + jnp.sum(self.arms * spin)
+        new = jnp.maximum(impulse - (u - self.at.least_m_s) / self.opens, 0.0)
+        change = jnp.where(self.at.touches, new, 0.0) - impulse
         return change, Speeds(
             speeds.velocity.at[boxes].add(change * self.pushes),
             speeds.spin.at[boxes].add(change * self.turns),
         )
-
-
-def _skew(lever: jax.Array) -> jax.Array:
-    x, y, z = lever
-    zero = jnp.zeros_like(x)
-    return jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])

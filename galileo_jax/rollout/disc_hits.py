@@ -26,7 +26,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Array, Rims, Walls
+from galileo_jax.model.effects.effect import Rims, Walls
 from galileo_jax.rollout.events import PLASTIC_M_S, newton, reaches_s
 from galileo_jax.rollout.motion import Dynamics
 
@@ -46,17 +46,11 @@ def length(vectors: jax.Array) -> jax.Array:
 
 
 class Rim(NamedTuple):
-    """The rims of some discs, or of one.
+    """The rims of some discs, or of one."""
 
-    Attributes:
-      radius_m: `[...]`, their mean.
-      oval: `[..., 2]`, c and s.
-      turned_rad: `[...]`, since c and s were stated.
-    """
-
-    radius_m: jax.Array
-    oval: jax.Array
-    turned_rad: jax.Array
+    radius_m: jax.Array  # `[...]`, their mean
+    oval: jax.Array  # `[..., 2]`, c and s
+    turned_rad: jax.Array  # `[...]`, since c and s were stated
 
     def reach_m(self, direction_rad: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
         """h, h' and h'' in a direction."""
@@ -97,16 +91,11 @@ def facing(apart_m: Float[jax.Array, " 2"], one: Rim, other: Rim) -> tuple[jax.A
 
 
 class Discs(NamedTuple):
-    """All discs of one rollout, or their rates of change.
+    """All discs of one rollout, or their rates of change."""
 
-    Attributes:
-      place_m, speed_m_s: `[object, 3]`, x, y and r turning / sqrt(2).
-      way_m: `[object]`, how far each has come along its curve.
-    """
-
-    place_m: Float[jax.Array, "object 3"]
+    place_m: Float[jax.Array, "object 3"]  # x, y and r turning / sqrt(2)
     speed_m_s: Float[jax.Array, "object 3"]
-    way_m: Float[jax.Array, " object"]
+    way_m: Float[jax.Array, " object"]  # how far each has come along its curve
 
     def after(self, a: jax.Array, t: jax.Array) -> "Discs":
         """At a constant acceleration `[object, 3]`."""
@@ -119,23 +108,15 @@ class Discs(NamedTuple):
 
 
 class Table(NamedTuple):
-    """What does not change in a rollout.
+    """What does not change in a rollout."""
 
-    Attributes:
-      law: the equations of motion.
-      rims: what a hit does.
-      radius_m: `[object]`, true.
-      walls: true; None where there are none.
-      pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`; None: in the
-        middle.
-      oval: `[object, 2]`, how far from round rims are, see `Effect.oval`; None: all are round.
-    """
-
-    law: Dynamics
-    rims: Rims
-    radius_m: jax.Array
-    walls: Walls | None
+    law: Dynamics  # the equations of motion
+    rims: Rims  # what a hit does
+    radius_m: jax.Array  # `[object]`, true
+    walls: Walls | None  # true; None where there are none
+    # `[object, 2]`, where discs press on the table, see `Effect.pressure`; None: in the middle
     pressure: Any | None
+    # `[object, 2]`, how far from round rims are, see `Effect.oval`; None: all are round
     oval: Any | None
 
     def rim(self, discs: Discs) -> Rim | None:
@@ -211,7 +192,7 @@ def after_hit(discs: Discs, speed_m_s: jax.Array, pair: np.ndarray, table: Table
         jnp.sum(inverse * (1.0 + 2.0 * reach**2)),
         -2.0 * jnp.sum(inverse * reach * side),
     )
-    push, rub = _impulse(approach, slip, gives, table.rims.restitution, table.rims.grip)
+    push, rub = _impulse(approach, slip, gives, table.rims)
     impulse, turns = push * normal + rub * across, ROOT2 * (side * push - reach * rub)
     change = jnp.concatenate([impulse, turns[1:]])
     back = jnp.concatenate([-impulse, turns[:1]])
@@ -231,8 +212,7 @@ def _impulse(
     approach: jax.Array,
     slip: jax.Array,
     gives: tuple[jax.Array, jax.Array, jax.Array],
-    restitution: Array,
-    grip: Array,
+    how: Rims | Walls,
 ) -> tuple[jax.Array, jax.Array]:
     """What a hit gives along and across: Newton's, and Coulomb's or as much as stops the slip.
 
@@ -240,19 +220,18 @@ def _impulse(
       approach: speed of the touching points towards each other, m/s.
       slip: across, m/s.
       gives: by how much impulses of 1 change the speed along, across, and one the other.
-      restitution: as in `Rims`.
-      grip: as in `Rims`.
+      how: restitution and grip.
     """
     along, across, mixed = gives
-    e = jnp.where(approach > PLASTIC_M_S, restitution, 0.0)
+    e = jnp.where(approach > PLASTIC_M_S, how.restitution, 0.0)
     wanted = jnp.maximum((1.0 + e) * approach, 0.0)
     rub = -(along * slip + mixed * wanted) / (along * across - mixed**2)
     push = (wanted - mixed * rub) / along
     way = jnp.sign(rub)
-    slides = jnp.abs(rub) > grip * push
-    most = wanted / (along + way * grip * mixed)
+    slides = jnp.abs(rub) > how.grip * push
+    most = wanted / (along + way * how.grip * mixed)
     hits = wanted > 0
-    push, rub = jnp.where(slides, most, push), jnp.where(slides, way * grip * most, rub)
+    push, rub = jnp.where(slides, most, push), jnp.where(slides, way * how.grip * most, rub)
     return jnp.where(hits, push, 0.0), jnp.where(hits, rub, 0.0)
 
 
@@ -316,7 +295,7 @@ def after_bounce(
     approach = -jnp.sum(speed_m_s[:, :2] * normal, axis=1) - side * turning
     slip = jnp.sum(speed_m_s[:, :2] * across, axis=1) - reach * turning
     gives = 1.0 + 2.0 * side**2, 1.0 + 2.0 * reach**2, -2.0 * reach * side  # as in `after_hit`
-    push, rub = _impulse(approach, slip, gives, table.walls.restitution, table.walls.grip)
+    push, rub = _impulse(approach, slip, gives, table.walls)
     change = push[:, None] * normal + rub[:, None] * across
     turns = ROOT2 * (side * push - reach * rub)
     change = jnp.concatenate([change, turns[:, None]], axis=1)

@@ -74,17 +74,12 @@ Pair = tuple[int, int]
 
 
 class Boxes(NamedTuple):
-    """All boxes at one instant; x along the table, y across it, away from the camera, z up.
+    """All boxes at one instant; x along the table, y across it, away from the camera, z up."""
 
-    Attributes:
-      pose: `[box]`; each is turned from flat and level.
-      stands_m_s2: `[box, corner, 3]`, what the table did over the last step, per mass and second.
-      pushes_n: `[pair, point]`, and what the boxes did to each other.
-    """
-
-    pose: Pose
+    pose: Pose  # `[box]`; each is turned from flat and level
+    # What the table did over the last step, per mass and second
     stands_m_s2: Float[jax.Array, "box corner 3"]
-    pushes_n: Float[jax.Array, "pair point"]
+    pushes_n: Float[jax.Array, "pair point"]  # and what the boxes did to each other
 
 
 class BoxTable:

@@ -33,24 +33,15 @@ NEWTON_STEPS = 8
 
 
 class Task(NamedTuple):
-    """What is rolled out.
+    """What is rolled out."""
 
-    Attributes:
-      effects: all that may act.
-      named: parameters by name.
-      scene: as declared.
-      dt_s: from record to record.
-      acts: `[effect]`, as in `motion.dynamics`.
-      num_records: of which there are places in the result.
-      count: of records that are wanted; beyond, centres are as in the last of these. None: all.
-    """
-
-    effects: tuple[Effect, ...]
-    named: Mapping[str, jax.Array]
-    scene: Surroundings
-    dt_s: float
-    acts: jax.Array | None
-    num_records: int
+    effects: tuple[Effect, ...]  # all that may act
+    named: Mapping[str, jax.Array]  # parameters by name
+    scene: Surroundings  # as declared
+    dt_s: float  # from record to record
+    acts: jax.Array | None  # `[effect]`, as in `motion.dynamics`
+    num_records: int  # of which there are places in the result
+    # Of records that are wanted; beyond, centres are as in the last of these. None: all.
     count: jax.Array | None
 
     def law(self) -> Dynamics:

@@ -22,17 +22,11 @@ HIT_AHEAD = 1.5  # records: so far ahead of a hit bodies are free
 
 
 class Poses(NamedTuple):
-    """Where bodies are and how they are turned.
+    """Where bodies are and how they are turned."""
 
-    Attributes:
-      position_m, velocity_m_s: `[..., object, 3, record]`: x along the travel, y up, z towards
-        the camera.
-      quaternion: `[..., object, 4, record]`, how each is turned from flat and level, in the axes
-        (x, -z, y).
-    """
-
-    position_m: Array
+    position_m: Array  # `[..., object, 3, record]`: x along the travel, y up, z towards the camera
     velocity_m_s: Array
+    # `[..., object, 4, record]`, how each is turned from flat and level, in the axes (x, -z, y)
     quaternion: Array
 
 

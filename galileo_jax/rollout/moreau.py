@@ -22,15 +22,10 @@ PUSH_OUT = 0.2  # share of a step's rounding that is taken back in the next
 
 
 class Masses(NamedTuple):
-    """What bodies have against being moved.
+    """What bodies have against being moved."""
 
-    Attributes:
-      inertia_m2: `[body, 3]`, principal moments over the masses.
-      inverse_kg: `[body]`, one over the masses.
-    """
-
-    inertia_m2: Float[jax.Array, "body 3"]
-    inverse_kg: Float[jax.Array, " body"]
+    inertia_m2: Float[jax.Array, "body 3"]  # principal moments over the masses
+    inverse_kg: Float[jax.Array, " body"]  # one over the masses
 
 
 class Contacts(NamedTuple):

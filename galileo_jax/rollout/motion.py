@@ -38,47 +38,34 @@ class Dynamics(NamedTuple):
 
     or, while less than the brake keeps the slip at 0, with so much of it. What does not roll has
     rim = 0: its slip is its speed, and without slip it rests.
-
-    Attributes:
-      mass: `[..., object]`, kg.
-      inertia: `[..., object]`, kg; the mass, and what turns with it.
-      rim: `[..., object]`, 1 / (beta m), 1/kg, of what rolls: how friction turns it; 0 of others.
-      friction: `[..., object]`, the constant coefficients that effects start from.
-      start_m, start_speed_m_s: `[..., object]`, at the release.
-      ramp_rad, table_rad: `[...]`, true slopes.
-      turn: cos and sin, each `[...]`, of the angle by which the path turns at the foot.
-      foot: `[...]`, factor on the speed kept at the foot.
-      restitution: `[...]`, between objects.
-      at_hits: `[..., object]`, kg; as inertia, and by how much of its momentum each hit passes on
-        (the rigid engine; MuJoCo's hits conserve it).
-      overlap_m: `[...]`, how much further apart neighbours touch again once they have met
-        (the rigid engine; MuJoCo's contacts give way by themselves).
-      coefficient: `State` to friction coefficients `[..., object]`.
-      drive: `State` to forces along the path but friction, `[..., object]`, N.
-      brake: `State` to friction's size `[..., object]`, N.
-      gravity: `[...]` or a number, m/s^2.
-      is_steady: whether drive and brake are constant on either side of the foot.
-      pushes: forces with directions of their own on one free body, see `Effect.push`.
     """
 
-    mass: PerObject
-    inertia: PerObject
+    mass: PerObject  # kg
+    inertia: PerObject  # kg; the mass, and what turns with it
+    # `[..., object]`, 1 / (beta m), 1/kg, of what rolls: how friction turns it; 0 of others
     rim: PerObject
-    friction: PerObject
-    start_m: PerObject
+    friction: PerObject  # the constant coefficients that effects start from
+    start_m: PerObject  # at the release
     start_speed_m_s: PerObject
-    ramp_rad: Array
+    ramp_rad: Array  # `[...]`, true slopes
     table_rad: Array
+    # Cos and sin, each `[...]`, of the angle by which the path turns at the foot
     turn: tuple[Array, Array]
-    foot: Array
-    restitution: Array
+    foot: Array  # `[...]`, factor on the speed kept at the foot
+    restitution: Array  # `[...]`, between objects
+    # `[..., object]`, kg; as inertia, and by how much of its momentum each hit passes on (the rigid
+    # engine; MuJoCo's hits conserve it)
     at_hits: PerObject
+    # `[...]`, how much further apart neighbours touch again once they have met (the rigid engine;
+    # MuJoCo's contacts give way by themselves)
     overlap_m: Array
-    coefficient: Callable[[State], PerObject]
+    coefficient: Callable[[State], PerObject]  # `State` to friction coefficients `[..., object]`
+    # `State` to forces along the path but friction, `[..., object]`, N
     drive: Callable[[State], PerObject]
-    brake: Callable[[State], PerObject]
-    gravity: Array
-    is_steady: bool
+    brake: Callable[[State], PerObject]  # `State` to friction's size `[..., object]`, N
+    gravity: Array  # `[...]` or a number, m/s^2
+    is_steady: bool  # whether drive and brake are constant on either side of the foot
+    # Forces with directions of their own on one free body, see `Effect.push`
     pushes: tuple[Push, ...] = ()
 
 

@@ -58,35 +58,22 @@ BUMPERS = Faces(
 
 
 class Fields(NamedTuple):
-    """What one rollout's parameters change before its first step; leading axes `[...]`.
+    """What one rollout's parameters change before its first step; leading axes `[...]`."""
 
-    Attributes:
-      mass: `[..., object]`, kg: the inertia, which is all the mass there is in MuJoCo.
-      friction: `[..., object]`, of the object's contacts with ramp and table.
-      qpos: `[..., dof]`, x and z of each object's centre relative to its body's place.
-      qvel: `[..., dof]`, m/s.
-      bumper: `[..., 2]`, (-stiffness, -damping) between objects, MuJoCo's direct solref.
-    """
-
-    mass: PerObject
-    friction: PerObject
-    qpos: Array
-    qvel: Array
-    bumper: Array
+    mass: PerObject  # kg: the inertia, which is all the mass there is in MuJoCo
+    friction: PerObject  # of the object's contacts with ramp and table
+    qpos: Array  # `[..., dof]`, x and z of each object's centre relative to its body's place
+    qvel: Array  # `[..., dof]`, m/s
+    bumper: Array  # `[..., 2]`, (-stiffness, -damping) between objects, MuJoCo's direct solref
 
 
 class Loads(NamedTuple):
-    """What acts besides MuJoCo's own gravity and friction; None where there is nothing.
+    """What acts besides MuJoCo's own gravity and friction; None where there is nothing."""
 
-    Attributes:
-      force: `State` to generalised forces `[..., dof]`, N.
-      friction: `State` to the contacts' coefficients `[..., object]`.
-      is_steady: whether what has come to rest stays so: nothing may depend on the time.
-    """
-
-    force: Callable[[State], Array] | None
+    force: Callable[[State], Array] | None  # `State` to generalised forces `[..., dof]`, N
+    # `State` to the contacts' coefficients `[..., object]`
     friction: Callable[[State], PerObject] | None
-    is_steady: bool
+    is_steady: bool  # whether what has come to rest stays so: nothing may depend on the time
 
 
 def finite(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

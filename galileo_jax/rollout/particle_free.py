@@ -21,16 +21,11 @@ STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
 
 
 class Body(NamedTuple):
-    """The body at one instant, or its rates of change.
+    """The body at one instant, or its rates of change."""
 
-    Attributes:
-      position_m, velocity_m_s: `[axis]`, x, y (up) and, in space, z.
-      way_m: how far it has come along its curve.
-    """
-
-    position_m: Float[jax.Array, " axis"]
+    position_m: Float[jax.Array, " axis"]  # x, y (up) and, in space, z
     velocity_m_s: Float[jax.Array, " axis"]
-    way_m: Float[jax.Array, ""]
+    way_m: Float[jax.Array, ""]  # how far it has come along its curve
 
 
 class FreeSystem(System):

@@ -37,23 +37,14 @@ class Swing(NamedTuple):
 
 
 class Pendulum(NamedTuple):
-    """What the parameters make of a pendulum.
+    """What the parameters make of a pendulum."""
 
-    Attributes:
-      law: the forces along its circle.
-      length_m: without load.
-      stretch_m: by its weight at rest.
-      has_friction: whether the bearing rubs.
-      first: the bob at the start.
-      scene: where it is.
-    """
-
-    law: Dynamics
-    length_m: Any
-    stretch_m: Any
-    has_friction: bool
-    first: Swing
-    scene: Surroundings
+    law: Dynamics  # the forces along its circle
+    length_m: Any  # without load
+    stretch_m: Any  # by its weight at rest
+    has_friction: bool  # whether the bearing rubs
+    first: Swing  # the bob at the start
+    scene: Surroundings  # where it is
 
     def rates(self, swing: Swing, time_s: Any, way: Any) -> tuple[Swing, Any]:
         """How a swing changes, and the least force over the mass that would hold it, m/s^2.

@@ -19,16 +19,11 @@ Links = tuple[jax.Array | bool, ...]
 
 
 class Bodies(NamedTuple):
-    """All bodies of one rollout.
+    """All bodies of one rollout."""
 
-    Attributes:
-      path_m, speed_m_s: of the centres.
-      rim_m_s: angular velocity times radius; 0 of what does not roll.
-    """
-
-    path_m: Numbers
+    path_m: Numbers  # of the centres
     speed_m_s: Numbers
-    rim_m_s: Numbers
+    rim_m_s: Numbers  # angular velocity times radius; 0 of what does not roll
 
     @property
     def slip_m_s(self) -> Numbers:

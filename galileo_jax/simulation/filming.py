@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,9 @@ import numpy as np
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.scene.scene import extents
 from galileo_jax.runtime import progress
-from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.settings import Settings
-from galileo_jax.simulation.truth import Truth
+from galileo_jax.simulation.truth import Declared, Truth
 from galileo_jax.video import synthetic
 
 MARGIN_M = 0.10  # round the motion, to the picture's edge
@@ -132,7 +132,10 @@ def film_ramp(
     )
     bodies = tuple(_body(each) for each in truth.objects)
     ramp = synthetic.Ramp(truth.angle_rad, truth.release_m + RAMP_ABOVE_M)
-    covered = film(out, path, bodies, camera, ramp, filming, num_frames, seed)
+    on_frame = reported(num_frames)
+    covered = synthetic.render_clip(
+        out, path, bodies, camera, ramp, filming, num_frames, seed=seed, on_frame=on_frame
+    )
     hand = filming.hand
     with_hand = np.flatnonzero(covered.max(axis=0))
     return {
@@ -155,29 +158,10 @@ def film_ramp(
     }
 
 
-def film(
-    out: Path,
-    path: synthetic.Motion,
-    bodies: tuple[synthetic.Body, ...],
-    camera: synthetic.Camera,
-    ramp: synthetic.Ramp | None,
-    filming: synthetic.Filming,
-    num_frames: int,
-    seed: int,
-) -> np.ndarray:
-    """Renders the video and reports its progress; returns what `render_clip` returns."""
+def reported(num_frames: int) -> Callable[[], None]:
+    """What reports the progress when it is called after each frame."""
     drawn = itertools.count(1)
-    return synthetic.render_clip(
-        out,
-        path,
-        bodies,
-        camera,
-        ramp,
-        filming,
-        num_frames,
-        seed=seed,
-        on_frame=lambda: progress.report("rendering", next(drawn) / num_frames),
-    )
+    return lambda: progress.report("rendering", next(drawn) / num_frames)
 
 
 def _body(declared: ClipObject) -> synthetic.Body:

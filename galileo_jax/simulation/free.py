@@ -181,31 +181,21 @@ def _swung(pendulum: Pendulum, times: np.ndarray) -> Motion:
 
 
 class Stretch(NamedTuple):
-    """How a motion goes on, up to its next event.
+    """How a motion goes on, up to its next event."""
 
-    Attributes:
-      state: where it begins.
-      change: time and state to the state's rate.
-      event: time and state to what falls through zero at the event.
-    """
-
-    state: np.ndarray
-    change: Callable[[float, np.ndarray], np.ndarray]
+    state: np.ndarray  # where it begins
+    change: Callable[[float, np.ndarray], np.ndarray]  # time and state to the state's rate
+    # Time and state to what falls through zero at the event
     event: Callable[[float, np.ndarray], float]
 
 
 class Integrated(NamedTuple):
-    """A motion.
+    """A motion."""
 
-    Attributes:
-      states: `[time, number]`.
-      changes: `[time]`, what moved it then, as of `Stretch`.
-      events_s: when there was an event.
-    """
-
-    states: np.ndarray
+    states: np.ndarray  # `[time, number]`
+    # `[time]`, what moved it then, as of `Stretch`
     changes: list[Callable[[float, np.ndarray], np.ndarray]]
-    events_s: tuple[float, ...]
+    events_s: tuple[float, ...]  # when there was an event
 
 
 def by_events(

@@ -18,17 +18,12 @@ from galileo_jax.simulation.truth import Truth
 
 
 class Range(NamedTuple):
-    """From weak to strong.
+    """From weak to strong."""
 
-    Attributes:
-      weak, strong: sizes; between them on a logarithmic scale.
-      is_signed: whether either sign is as likely.
-      is_per_mass: whether it is times object 1's mass: a force that gives an acceleration.
-    """
-
-    weak: float
+    weak: float  # sizes; between them on a logarithmic scale
     strong: float
-    is_signed: bool = False
+    is_signed: bool = False  # whether either sign is as likely
+    # Whether it is times object 1's mass: a force that gives an acceleration
     is_per_mass: bool = False
 
 
@@ -66,17 +61,12 @@ STARTS_AT_ALL = Range(0.02, 0.002)  # tan a - k that static friction leaves, fro
 
 
 class Hidden(NamedTuple):
-    """An effect to hide.
+    """An effect to hide."""
 
-    Attributes:
-      effect: the effect.
-      given: values of its parameters; what is missing is drawn.
-      strength: 0 (weak) to 1 (strong); None draws it.
-    """
-
-    effect: Effect
+    effect: Effect  # the effect
+    # Values of its parameters; what is missing is drawn
     given: Mapping[str, float] = MappingProxyType({})
-    strength: float | None = None
+    strength: float | None = None  # 0 (weak) to 1 (strong); None draws it
 
 
 def make_hidden(

@@ -20,22 +20,15 @@ RECORD_S = fine.STEP_S * fine.STEPS_PER_RECORD
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a truth, in the engine's time steps from the release on.
+    """The motion of a truth, in the engine's time steps from the release on."""
 
-    Attributes:
-      times_s: `[time]`.
-      position_m, velocity_m_s: `[object, 2, time]`.
-      pitch_rad: `[object, time]`, counter-clockwise positive.
-      z_m: `[object, time]`, towards the camera; None in a plane.
-      quaternion: `[object, 4, time]`, how each is turned from flat and level, as
-        `free_start.Poses`; None in a plane.
-    """
-
-    times_s: np.ndarray
-    position_m: np.ndarray
+    times_s: np.ndarray  # `[time]`
+    position_m: np.ndarray  # `[object, 2, time]`
     velocity_m_s: np.ndarray
-    pitch_rad: np.ndarray
-    z_m: np.ndarray | None = None
+    pitch_rad: np.ndarray  # `[object, time]`, counter-clockwise positive
+    z_m: np.ndarray | None = None  # `[object, time]`, towards the camera; None in a plane
+    # `[object, 4, time]`, how each is turned from flat and level, as `free_start.Poses`; None in a
+    # plane
     quaternion: np.ndarray | None = None
 
     @property

@@ -31,27 +31,16 @@ WEAK_Z, STRONG_Z = -0.5, 1.0
 
 @dataclass(frozen=True)
 class PlaneTruth:
-    """One experiment.
+    """One experiment."""
 
-    Attributes:
-      scenario: its name.
-      things: names, shapes, sizes and masses.
-      values: every parameter by name, those of `effects` too.
-      start_m: `[object]`, (x, y) of the centres at the start.
-      seconds: how long it is looked at, at most.
-      release_s: a fall is let go so long after the first frame.
-      effects: what is hidden in the clip.
-      walls_m: the ends of every wall.
-    """
-
-    scenario: str
-    things: tuple[ClipObject, ...]
-    values: Mapping[str, float]
-    start_m: tuple[Point, ...]
-    seconds: float = math.inf
-    release_s: float = 0.0
-    effects: tuple[Effect, ...] = ()
-    walls_m: tuple[tuple[Point, Point], ...] = ()
+    scenario: str  # its name
+    things: tuple[ClipObject, ...]  # names, shapes, sizes and masses
+    values: Mapping[str, float]  # every parameter by name, those of `effects` too
+    start_m: tuple[Point, ...]  # `[object]`, (x, y) of the centres at the start
+    seconds: float = math.inf  # how long it is looked at, at most
+    release_s: float = 0.0  # a fall is let go so long after the first frame
+    effects: tuple[Effect, ...] = ()  # what is hidden in the clip
+    walls_m: tuple[tuple[Point, Point], ...] = ()  # the ends of every wall
     gravity: float = GRAVITY_M_S2
 
     def value(self, name: str) -> float:

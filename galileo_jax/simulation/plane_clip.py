@@ -21,9 +21,9 @@ from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
 from galileo_jax.simulation.filming import (
     MARGIN_M,
     declared_picture,
-    film,
     plane_camera,
     plane_filming,
+    reported,
 )
 from galileo_jax.simulation.free import WATER_KG_M3, draw_free, solve_free
 from galileo_jax.simulation.hidden import Hidden
@@ -92,7 +92,10 @@ def _write(settings: Settings, truth: PlaneTruth, looks: np.random.Generator, ou
         # From above a puck is a disc, and all else is a ball.
         bodies = tuple(synthetic.Body("sphere", (radius,)) for radius in scene.half_length_m)
         filming = plane_filming(settings, truth.clock)
-        film(out, path, bodies, camera, None, filming, len(frames.times_s), settings.seed)
+        count, seed = len(frames.times_s), settings.seed
+        synthetic.render_clip(
+            out, path, bodies, camera, None, filming, count, seed=seed, on_frame=reported(count)
+        )
     write_yaml_and_truth(out, content, record)
 
 

@@ -11,15 +11,13 @@ import numpy as np
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.simulation.check_settings import shapes_of
 from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
-from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.filming import declared_picture, film_ramp, ramp_camera, ramp_filming
 from galileo_jax.simulation.hidden import Hidden
-from galileo_jax.simulation.like import truth_like
 from galileo_jax.simulation.motion import LONGEST_S, Motion, roll_out
 from galileo_jax.simulation.record import truth_record
 from galileo_jax.simulation.series import draw_series, with_faults
 from galileo_jax.simulation.settings import Settings
-from galileo_jax.simulation.truth import Truth
+from galileo_jax.simulation.truth import Declared, Truth, truth_like
 from galileo_jax.video import synthetic
 
 BEYOND_TABLE_M = 2.5  # x, where a clip ends; a board alone ends at 0

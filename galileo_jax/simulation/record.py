@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.plane import PlaneTruth
 from galileo_jax.simulation.settings import Settings
-from galileo_jax.simulation.truth import Truth
+from galileo_jax.simulation.truth import Declared, Truth
 
 
 def truth_record(

@@ -1,8 +1,10 @@
 """What a synthetic clip is made with: drawn at random where it is not given."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -10,8 +12,11 @@ from galileo_jax.clip.fields import Shape
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.scene.scene import extents, rolling, start_paths
+from galileo_jax.runtime.errors import InputError
 
+NONE = "none"  # hidden
 # What the clip's yaml says wrongly: the motion itself knows nothing of it.
 DECLARED_WRONGLY = ("frame_rate", "ramp_angle", "scale_error")
 GRAVITY_M_S2 = 9.81
@@ -21,31 +26,20 @@ SLOWEST_HIT_M_S = 0.5  # a weaker hit says little about object 2
 
 @dataclass(frozen=True)
 class Truth:
-    """One experiment on a ramp.
+    """One experiment on a ramp."""
 
-    Attributes:
-      mass_kg, friction: of the objects.
-      ramp_angle_deg: of the ramp.
-      objects: names, shapes and sizes.
-      release_m: distance up the ramp from the foot to the point under object 1's centre.
-      object2_x_m: where object 2's centre stands.
-      scenario: ramp, multi or incline.
-      beyond_x_m: where the centres of the objects beyond object 2 stand.
-      gravity: m/s^2.
-      effects: what is hidden in the clip, in the motion or in what is declared of it.
-      effect_values: their parameters by name, all of them.
-    """
-
-    mass_kg: tuple[float, ...]
+    mass_kg: tuple[float, ...]  # of the objects
     friction: tuple[float, ...]
-    ramp_angle_deg: float
-    objects: tuple[ClipObject, ...]
-    release_m: float
-    object2_x_m: float
-    gravity: float = GRAVITY_M_S2
-    scenario: str = "ramp"
-    beyond_x_m: tuple[float, ...] = ()
+    ramp_angle_deg: float  # of the ramp
+    objects: tuple[ClipObject, ...]  # names, shapes and sizes
+    release_m: float  # distance up the ramp from the foot to the point under object 1's centre
+    object2_x_m: float  # where object 2's centre stands
+    gravity: float = GRAVITY_M_S2  # m/s^2
+    scenario: str = "ramp"  # ramp, multi or incline
+    beyond_x_m: tuple[float, ...] = ()  # where the centres of the objects beyond object 2 stand
+    # What is hidden in the clip, in the motion or in what is declared of it
     effects: tuple[Effect, ...] = ()
+    # Their parameters by name, all of them
     effect_values: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -113,6 +107,72 @@ class Truth:
         beyond = max(0.0, at_foot) * max(0.0, cos - k1 * sin) ** 2
         run = self.object2_x_m - sum(where.half_length_m[:2]) - where.corner_m[0]
         return math.sqrt(max(0.0, beyond - twice_g * k1 * run))
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a user says of a clip: wrong where an effect of the measurement is hidden."""
+
+    fps: float  # frames per second
+    ramp_angle_deg: float  # of the ramp
+    scale: float  # measured lengths are so many times the true ones
+    true_fps: float  # at which the frames were taken
+    release_s: float  # when object 1 is let go after the first frame, true seconds
+
+    @classmethod
+    def of(cls, truth: Truth, fps: float) -> "Declared":
+        """What is declared about `truth`, filmed at what is said to be `fps`."""
+        value = truth.effect_values.get
+        steeper_deg = math.degrees(value("ramp_angle", 0.0))
+        return cls(
+            fps=fps,
+            ramp_angle_deg=round(truth.ramp_angle_deg - steeper_deg, 9),
+            scale=1.0 + value("scale_error", 0.0),
+            true_fps=fps / (1.0 + value("frame_rate", 0.0)),
+            release_s=value("release_delay", 0.0) + value("release_instant", 0.0),
+        )
+
+    def taken_s(self, num_frames: int) -> np.ndarray:
+        """When each frame was taken, `[frame]`, true seconds since the release."""
+        return np.arange(num_frames) / self.true_fps - self.release_s
+
+
+def truth_like(path: Path, ramp_angle_deg: float, scenario: str) -> Truth:
+    """The truth of NAME.truth.json on a ramp declared to have another angle.
+
+    Raises:
+      InputError: it is no truth of a clip on a ramp that this program simulated.
+    """
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        if record["scenario"] != scenario:
+            raise InputError(f"--like: {path}: scenario {record['scenario']}; {scenario} expected")
+        count = int(record["objects"])
+        names = [] if record["effect"] == NONE else str(record["effect"]).split("+")
+        values = {name: float(value) for name, value in record["effect_parameters"].items()}
+        numbers = range(1, count + 1)
+        return Truth(
+            mass_kg=tuple(float(record[f"m{i}"]) for i in numbers),
+            friction=tuple(float(record[f"k{i}"]) for i in numbers),
+            ramp_angle_deg=ramp_angle_deg + math.degrees(values.get("ramp_angle", 0.0)),
+            objects=tuple(
+                ClipObject(name=f"object{i}", shape=shape, size_m=record[f"size{i}_m"], rolls=rolls)
+                for i, shape, rolls in zip(numbers, record["shapes"], record["rolls"], strict=True)
+            ),
+            release_m=float(record["release_m"]),
+            object2_x_m=float(record.get("object2_y_m", 0.0)),
+            gravity=float(record["gravity"]),
+            scenario=scenario,
+            beyond_x_m=tuple(float(record[f"object{i}_y_m"]) for i in numbers if i > 2),
+            effects=tuple(make_effects(names)),
+            effect_values=values,
+        )
+    except OSError as error:
+        raise InputError(f"--like: {path}: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"--like: {path}: not the truth of a clip that this version simulated ({error})"
+        ) from error
 
 
 def draw_truth(

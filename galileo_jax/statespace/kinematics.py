@@ -23,47 +23,32 @@ BEFORE, AFTER = 3, 4  # frames that tell speeds at a hit
 
 @dataclass(frozen=True)
 class Hit:
-    """One body that meets the next one, which rests.
+    """One body that meets the next one, which rests."""
 
-    Attributes:
-      step: the hit is between frames `step` and `step + 1`.
-      rear, front: the bodies.
-      kept, given: speeds after it over the rear's before it.
-      lost_m_s, gained_m_s: by which the rear's and the front's speed change.
-      near: `[frame-1]`, steps in which faces of the two are near each other.
-    """
-
-    step: int
-    rear: int
+    step: int  # the hit is between frames `step` and `step + 1`
+    rear: int  # the bodies
     front: int
-    kept: float
+    kept: float  # speeds after it over the rear's before it
     given: float
-    lost_m_s: float
+    lost_m_s: float  # by which the rear's and the front's speed change
     gained_m_s: float
-    near: Bool[np.ndarray, " step"]
+    near: Bool[np.ndarray, " step"]  # steps in which faces of the two are near each other
 
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Measured motion along a path.
-
-    Attributes:
-      times_s: `[frame]`.
-      path_m: `[object, frame]`, past the foot; between measured places on straight lines.
-      tangent: `[object, 2, frame]`, unit vectors of the path, in the direction of travel.
-      speed_m_s: `[object, frame]`, along the path; 0 at rest.
-      moves: `[object, frame-1]`, whether each moves from frame to frame.
-      normal_m_s2: `[object, frame]`, what presses each onto the surface, over its mass.
-      hits: in time's order.
-    """
+    """Measured motion along a path."""
 
     times_s: Float[np.ndarray, " frame"]
+    # Past the foot; between measured places on straight lines
     path_m: Float[np.ndarray, "object frame"]
+    # Unit vectors of the path, in the direction of travel
     tangent: Float[np.ndarray, "object axis frame"]
-    speed_m_s: Float[np.ndarray, "object frame"]
-    moves: Bool[np.ndarray, "object step"]
+    speed_m_s: Float[np.ndarray, "object frame"]  # along the path; 0 at rest
+    moves: Bool[np.ndarray, "object step"]  # whether each moves from frame to frame
+    # What presses each onto the surface, over its mass
     normal_m_s2: Float[np.ndarray, "object frame"]
-    hits: tuple[Hit, ...] = ()
+    hits: tuple[Hit, ...] = ()  # in time's order
 
     @property
     def step_s(self) -> Float[np.ndarray, " step"]:

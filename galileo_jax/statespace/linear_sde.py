@@ -17,15 +17,10 @@ LARGEST_RATE = 0.5  # of a step whose exponential is taken; longer ones are doub
 
 
 class Transitions(NamedTuple):
-    """From each frame to the next.
+    """From each frame to the next."""
 
-    Attributes:
-      step: `[frame-1, state, state]`, F.
-      noise: `[frame-1, state, state]`, Q.
-    """
-
-    step: Float[np.ndarray, "step state state"]
-    noise: Float[np.ndarray, "step state state"]
+    step: Float[np.ndarray, "step state state"]  # F
+    noise: Float[np.ndarray, "step state state"]  # Q
 
 
 def transitions(

@@ -10,21 +10,15 @@ from galileo_jax.statespace.term import USUAL
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of terms: the most probable ones, and draws of what they may be.
+    """Sizes of terms: the most probable ones, and draws of what they may be."""
 
-    Attributes:
-      names: of the terms.
-      x: `[term]`, logarithms of the most probable sizes over their priors' medians, in units of
-        the priors' sds.
-      draws: `[draw, term and clip]`, as `x`, and of each clip the noise scale's logarithm in the
-        same way, as the data leave them open.
-      log_evidence: what having sizes adds to the log evidence at the most probable ones.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the terms
+    # Logarithms of the most probable sizes over their priors' medians, in units of the priors' sds
     x: Float[np.ndarray, " term"]
+    # As `x`, and of each clip the noise scale's logarithm in the same way, as the data leave them
+    # open
     draws: Float[np.ndarray, "draw term_and_clip"]
-    log_evidence: float
+    log_evidence: float  # what having sizes adds to the log evidence at the most probable ones
 
     @property
     def unusual(self) -> list[str]:

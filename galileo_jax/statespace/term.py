@@ -20,40 +20,27 @@ Patterns = Float[np.ndarray, "pattern object axis frame"]
 
 @dataclass(frozen=True)
 class Seen:
-    """What terms are made of.
+    """What terms are made of."""
 
-    Attributes:
-      observation: the data.
-      scene: what they show.
-      motion: along the path; None where no surface leads the bodies.
-    """
-
-    observation: Observation
-    scene: Surroundings
-    motion: Kinematics | None
+    observation: Observation  # the data
+    scene: Surroundings  # what they show
+    motion: Kinematics | None  # along the path; None where no surface leads the bodies
 
 
 @dataclass(frozen=True)
 class Term:
-    """A random function of unknown size.
+    """A random function of unknown size."""
 
-    Attributes:
-      name: as in `imperfections` of result.json.
-      meaning: one sentence for the user, with {size}.
-      unit: of the size.
-      median, factor: of the size's log-normal prior; `median` maps what was seen to it.
-      patterns: `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit
-        size; none where the term has no place.
-      is_of_marks: whether it is where bodies are seen, and not where they are.
-    """
-
-    name: str
-    meaning: str
-    unit: str
+    name: str  # as in `imperfections` of result.json
+    meaning: str  # one sentence for the user, with {size}
+    unit: str  # of the size
+    # Of the size's log-normal prior; `median` maps what was seen to it
     median: Callable[[Seen], float]
     factor: float
+    # `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit size; none
+    # where the term has no place
     patterns: Callable[[Seen], Patterns]
-    is_of_marks: bool = False
+    is_of_marks: bool = False  # whether it is where bodies are seen, and not where they are
 
 
 TERMS: Registry[Term] = Registry("imperfection", "imperfections", "galileo_jax.statespace.terms")

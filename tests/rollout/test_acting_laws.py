@@ -9,17 +9,10 @@ import pytest
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_path import EnginePath
-from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_model, make_theta
 
 EFFECTS = ("air_drag", "friction_patch", "restitution")
 ROUNDING_M = 1e-12  # another program rounds otherwise
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from galileo_jax.rollout.box_faces import AFAR_M, Box, touch
-from tests.precision import in_64_bit
 
 HALF_M = (np.array([0.03, 0.025, 0.02]), np.array([0.02, 0.04, 0.05]))
 DISTANCE_ATOL_M = 1e-6  # of MuJoCo's iteration
@@ -19,12 +18,6 @@ SCENE = """<mujoco><worldbody>
 <body><freejoint/><geom type="box" size="{} {} {}"/></body>
 <body><freejoint/><geom type="box" size="{} {} {}"/></body>
 </worldbody></mujoco>"""
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def turned(yaw_rad: float) -> np.ndarray:

@@ -5,16 +5,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.rollout.box_impulses import Corners, Points, Speeds, after_impulses
-from tests.precision import in_64_bit
 
 MASS_KG, SIDE_M, SPEED_M_S = np.array([0.5, 0.3]), 0.06, 1.2
 SOLVED_M_S = 1e-8
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def cubes_meet(aside_m: float, restitution: float) -> Speeds:

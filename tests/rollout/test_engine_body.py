@@ -24,7 +24,6 @@ from galileo_jax.rollout.body import (
     thrown,
 )
 from galileo_jax.rollout.engine_body import roll_out
-from tests.precision import in_64_bit
 
 mujoco: Any = mujoco_stubs  # its stubs lack what is used here
 EDGE_M, G, FPS = 0.1048, 9.81, 148.0
@@ -45,12 +44,6 @@ def energy_j_kg(solid: Solid, pose: Pose) -> jax.Array:
     turning = pose.momentum_m2_s @ spin_rad_s(solid, pose)
     high = solid.gravity * (pose.position_m[2] - solid.floor_m)
     return 0.5 * (pose.velocity_m_s @ pose.velocity_m_s + turning) + high
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def cube(friction=0.18, restitution=0.125, gravity=G, size=(EDGE_M,) * 3, round_m=0.0) -> Solid:

@@ -17,7 +17,6 @@ from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.events import of_task
 from galileo_jax.rollout.free_start import with_depths
 from galileo_jax.runtime.errors import InputError
-from tests.precision import in_64_bit
 from tests.rollout.free_boxes import (
     FRICTION,
     MASS_KG,
@@ -40,12 +39,6 @@ ROUGH_M = 1e-6
 SLOPE_RTOL = 0.02  # of a polynomial through 21 of them
 ALONE_ATOL_M = 1e-9
 FINER_ATOL_M = 1e-4
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def of_boxes(objects: list[ClipObject], *effects: str) -> Model:

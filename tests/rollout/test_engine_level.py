@@ -41,7 +41,6 @@ def alone(**values: float) -> PlaneTruth:
     return replace(far, start_m=((0.0, 0.0), (0.0, -1.0)))
 
 
-@pytest.mark.usefixtures("x64")
 def test_a_puck_stops_where_and_when_it_should() -> None:
     one = alone(k1=0.4, start_turning1=20.0)
     radius = (one.things[0].size_m or (0.0,))[0]
@@ -59,7 +58,6 @@ def test_a_puck_stops_where_and_when_it_should() -> None:
     assert plain[0, 0, -1] == pytest.approx(1.0 / (2 * 0.4 * G), abs=EXACT)
 
 
-@pytest.mark.usefixtures("x64")
 def test_equal_pucks_head_on_exchange_their_speeds() -> None:
     drawn = truth(
         m1=0.05,
@@ -77,7 +75,6 @@ def test_equal_pucks_head_on_exchange_their_speeds() -> None:
     assert velocity[1, :, -1] == pytest.approx([1, 0, 0], abs=1e-3)
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", range(4))
 def test_a_hit_off_centre_conserves_momenta(seed: int) -> None:
     one = truth(seed, k1=1e-5, k2=1e-5)
@@ -100,7 +97,6 @@ def test_a_hit_off_centre_conserves_momenta(seed: int) -> None:
     assert energy[-1] < energy[0]
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", range(6))
 def test_agrees_with_the_fine_solver(seed: int) -> None:
     one = truth(seed)
@@ -123,7 +119,6 @@ def beside(
     return replace(one, values={**one.values, **walls}, walls_m=(ends,))
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("wall", [((0.2, -0.5), (0.4, 0.5)), ((0.4, 0.5), (0.2, -0.5))])
 def test_an_elastic_wall_is_a_mirror(wall: tuple[tuple[float, float], tuple[float, float]]) -> None:
     """Reflected at the line one radius before the wall, the way is that without the wall."""
@@ -141,7 +136,6 @@ def test_an_elastic_wall_is_a_mirror(wall: tuple[tuple[float, float], tuple[floa
     assert np.abs(velocity[0, 1]).max() > 0.2
 
 
-@pytest.mark.usefixtures("x64")
 def test_a_wall_gives_back_and_rubs_as_it_should() -> None:
     """Head-on e is left; a turning puck gets r turning / 3 along the wall, if grip allows."""
     wall = ((0.2, -1.0), (0.2, 1.0))
@@ -157,7 +151,6 @@ def test_a_wall_gives_back_and_rubs_as_it_should() -> None:
     assert np.asarray(velocity[0, 1, -1]) == pytest.approx(-0.016, abs=1e-4)  # 0.01 (1 + e) v
 
 
-@pytest.mark.usefixtures("x64")
 def test_what_passes_beside_a_wall_or_is_slow_does_not_bounce() -> None:
     ended = rolled(beside(((0.2, 0.01), (0.2, 0.5)), 1.0, k1=0.1), 1.0)[0]
     free = rolled(alone(k1=0.1), 1.0)[0]
@@ -183,7 +176,6 @@ def uneven(one: PlaneTruth, *shares: float) -> PlaneTruth:
     return replace(one, values=values, effects=effects)
 
 
-@pytest.mark.usefixtures("x64")
 def test_pressure_beside_the_middle_turns_a_puck() -> None:
     """At first by 2 k g c / r^2, by nothing where it trails; energy goes by k m g |W|."""
     still = alone(k1=0.3, start_turning1=0.0)
@@ -207,7 +199,6 @@ def test_pressure_beside_the_middle_turns_a_puck() -> None:
     assert -np.diff(energy)[:60] == pytest.approx(lost[:60], rel=2e-3)
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", [0, 2])
 def test_uneven_pressure_agrees_with_the_fine_solver(seed: int) -> None:
     drawn = draw_level(np.random.default_rng(seed), {}, has_walls=True)
@@ -236,7 +227,6 @@ def outline(radius: float, c: float, s: float) -> np.ndarray:
     return h[:, None] * along + slope[:, None] * along[:, ::-1] * [-1.0, 1.0]
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize(
     "shares", [(0.05, 0.0, 0.0, 0.0), (0.03, -0.06, 0.0, 0.1), (-0.1, 0.05, 0.08, 0.02)]
 )
@@ -257,7 +247,6 @@ def test_oval_rims_face_each_other_where_their_outlines_are_nearest(
     assert float(direction) == pytest.approx(math.atan2(way[1], way[0]), abs=2e-3)
 
 
-@pytest.mark.usefixtures("x64")
 def test_an_oval_rim_turns_what_it_hits_without_grip() -> None:
     """Head-on: momentum is conserved, and each turns by r^2 m w / 2 = h' P about its middle."""
     drawn = truth(
@@ -287,7 +276,6 @@ def test_an_oval_rim_turns_what_it_hits_without_grip() -> None:
     assert position[1, 0, hit - 1] == pytest.approx(0.3)
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize(("seed", "has_walls"), [(0, False), (3, False), (2, True)])
 def test_oval_rims_agree_with_the_fine_solver(seed: int, has_walls: bool) -> None:
     drawn = draw_level(np.random.default_rng(seed), {}, has_walls=has_walls)
@@ -303,7 +291,6 @@ def test_oval_rims_agree_with_the_fine_solver(seed: int, has_walls: bool) -> Non
     assert np.abs(position - np.asarray(free)).max() > 10 * FINE_M
 
 
-@pytest.mark.usefixtures("x64")
 def test_rims_that_are_hardly_oval_move_as_round_ones() -> None:
     drawn = draw_level(np.random.default_rng(2), {}, has_walls=True)
     position, _ = rolled(oval(drawn, 0.0, 0.0, 0.0, 0.0), 1.2)
@@ -311,7 +298,6 @@ def test_rims_that_are_hardly_oval_move_as_round_ones() -> None:
     assert np.asarray(position) == pytest.approx(np.asarray(expected), abs=1e-8)
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_walls_agree_with_the_fine_solver(seed: int) -> None:
     one = draw_level(np.random.default_rng(seed), {}, has_walls=True)
@@ -332,7 +318,6 @@ def test_walls_agree_with_the_fine_solver(seed: int) -> None:
         assert high[0] < u + 1e-6 and high[1] < v + 1e-6
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("name", ["table_tilt", "air_drag", "viscous_drag", "stribeck"])
 def test_effects_agree_with_the_fine_solver(name: str) -> None:
     one = truth(3)
@@ -349,7 +334,6 @@ def test_effects_agree_with_the_fine_solver(name: str) -> None:
     assert np.abs(np.asarray(position - plain)).max() > 10 * FINE_M
 
 
-@pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize(
     ("seed", "has_walls", "is_oval"),
     [

@@ -15,16 +15,9 @@ from galileo_jax.rollout.events import (
     step_by_events,
     to_crossing,
 )
-from tests.precision import in_64_bit
 
 G = 9.81
 EXACT = 1e-12
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 @pytest.mark.parametrize(

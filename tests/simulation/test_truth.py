@@ -11,11 +11,10 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.series import draw_series
-from galileo_jax.simulation.truth import draw_truth
+from galileo_jax.simulation.truth import Declared, draw_truth
 from tests.model.effects.motion import LIBRARY
 
 # The two integrators differ by where within 0.1 ms a hit or a stop is put.

@@ -62,11 +62,9 @@ class FreeAcceleration(Effect):
     Between pieces it may jump: what depends on the speed does, where objects collide. The
     spans reach compiled code as parameters that nobody lets free: one program serves all
     clips, and the effects are equal whatever their spans.
-
-    Attributes:
-      spans_s: `[object][piece]`, when each begins and ends, s since the release, in order.
     """
 
+    # `[object][piece]`, when each begins and ends, s since the release, in order
     spans_s: tuple[tuple[Span, ...], ...]
 
     name = "free_acceleration"

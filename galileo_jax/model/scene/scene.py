@@ -40,17 +40,11 @@ BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do no
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene; what the rollouts need besides the parameters.
+    """A scene; what the rollouts need besides the parameters."""
 
-    Attributes:
-      surroundings: names, geometry and start, as effects see them.
-      objects: as declared.
-      timestep_s: of MuJoCo's engines.
-    """
-
-    surroundings: Surroundings
-    objects: tuple[ClipObject, ...]
-    timestep_s: float = TIMESTEP_S
+    surroundings: Surroundings  # names, geometry and start, as effects see them
+    objects: tuple[ClipObject, ...]  # as declared
+    timestep_s: float = TIMESTEP_S  # of MuJoCo's engines
 
     @property
     def spec(self) -> "mujoco.MjSpec":

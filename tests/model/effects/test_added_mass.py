@@ -18,18 +18,11 @@ from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.library.added_mass import PRIOR
 from galileo_jax.model.parameters import LongTailed, absent
 from tests.clip.test_pendulum import angles, closed_form
-from tests.precision import in_64_bit
 
 G, M, SHARE = 9.81, 0.1, 0.08
 SLOWER = G * (1 - 2 * SHARE) / (1 + SHARE)
 TIMES = np.arange(40) / 60
 EXACT_M = 1e-9
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def problem_of(folder: Path, scenario: str, size: str = "[0.02]", mass: str = "null"):

@@ -11,17 +11,10 @@ from galileo_jax.api.fit import fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import measure
-from tests.precision import in_64_bit
 
 G, FPS, NOISE_M, BETA = 9.81, 60.0, 3e-4, 0.5
 LENGTH_M, RADIUS_M = 1.2, 0.03
 TOP, END = math.radians(7.0), math.radians(-6.0)  # slopes at both ends: a valley
-
-
-@pytest.fixture(autouse=True)
-def precision():
-    with in_64_bit():
-        yield
 
 
 def rolled(seconds: float, rest_s: float) -> tuple[np.ndarray, np.ndarray]:
