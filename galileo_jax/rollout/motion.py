@@ -97,9 +97,6 @@ def dynamics(
     for effect in effects:
         start = effect.start(start, theta, scene)
     share = total([e.inertia(theta, scene) for e in effects])
-    speed = total([e.start_speed(theta, scene) for e in effects])
-    restitution = total([e.restitution(theta, scene) for e in effects])
-    overlap = total([e.overlap(theta, scene) for e in effects])
     ramp, table, foot = scene.angle_rad + xp.zeros(lead), xp.zeros(lead), xp.ones(lead)
     for effect in effects:
         if (tilt := effect.tilt(theta, scene)) is not None:
@@ -116,14 +113,14 @@ def dynamics(
         rim=_rim(mass, scene),
         friction=friction,
         start_m=start,
-        start_speed_m_s=xp.zeros(mass.shape) if speed is None else speed,
+        start_speed_m_s=total([e.start_speed(theta, scene) for e in effects], xp.zeros(mass.shape)),
         ramp_rad=ramp,
         table_rad=table,
         turn=(xp.cos(ramp - table), xp.sin(ramp - table)),
         foot=foot,
-        restitution=xp.zeros(lead) if restitution is None else restitution,
+        restitution=total([e.restitution(theta, scene) for e in effects], xp.zeros(lead)),
         at_hits=_at_hits(inertia, [e.passed_on(theta, scene) for e in effects]),
-        overlap_m=xp.zeros(lead) if overlap is None else overlap,
+        overlap_m=total([e.overlap(theta, scene) for e in effects], xp.zeros(lead)),
         coefficient=coefficient,
         drive=drive,
         brake=brake,
@@ -257,7 +254,7 @@ def pitch(position: OfCentres, scene: Surroundings) -> PerObject:
     return -scene.angle_rad * (1 - share)
 
 
-def total(given: Sequence[Any | None]) -> Any | None:
-    """The sum of what is given; None where nothing is."""
+def total(given: Sequence[Any | None], nothing: Any = None) -> Any:
+    """The sum of what is given; `nothing` where nothing is."""
     terms = [each for each in given if each is not None]
-    return sum(terms[1:], terms[0]) if terms else None
+    return sum(terms[1:], terms[0]) if terms else nothing

@@ -62,21 +62,16 @@ def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | No
         return None
     times = observation.times_s
     count, frames = observation.mask.shape
-    angle = np.zeros((count, frames))
-    speed, moves = np.zeros((count, frames)), np.zeros((count, max(frames - 1, 0)), bool)
-    place = np.zeros((count, frames))
+    angle, speed, place = np.zeros((3, count, frames))
+    moves = np.zeros((count, max(frames - 1, 0)), bool)
     for i in range(count):
         x, y = _filled(observation, i)
         angle[i] = scene.angle_rad
         if scene.has_table:
             is_on_ramp = scene.comes_down[i] & (x < scene.corner_m[i])
             angle[i] = np.where(is_on_ramp, scene.angle_rad, 0.0)
-        past = np.where(angle[i] == 0, 0.0, 1.0)
-        place[i] = np.where(
-            past == 1,
-            (x - _finite(scene.corner_m[i])) * np.cos(angle[i]) - y * np.sin(angle[i]),
-            x - _finite(scene.corner_m[i]),
-        )
+        corner = scene.corner_m[i] if math.isfinite(scene.corner_m[i]) else 0.0
+        place[i] = (x - corner) * np.cos(angle[i]) - y * np.sin(angle[i])
         sd = _noise_m(observation, i)
         speed[i] = np.abs(_slope(times, place[i]))
         least = max(STILL_M_S, CLEAR * sd / _lever_s(times))
@@ -95,10 +90,6 @@ def velocities(observation: Observation) -> Float[np.ndarray, "object axis frame
         for axis in range(found.shape[1] - int(observation.is_turning)):
             found[i, axis] = _slope(observation.times_s, places[axis])
     return found
-
-
-def _finite(corner_m: float) -> float:
-    return corner_m if math.isfinite(corner_m) else 0.0
 
 
 def _filled(observation: Observation, i: int) -> np.ndarray:
