@@ -287,7 +287,6 @@ class Effect:
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> PerObject | None:
         """Returns the speed at the release `[..., object]`, m/s, or None."""
-        return None
 
     def start_velocity(
         self, theta: Theta, scene: Surroundings
@@ -296,7 +295,6 @@ class Effect:
 
         In space `[..., object, 3]`; from above the third is the turning, rad/s.
         """
-        return None
 
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """Returns the force along the path as a function of the state, or None.
@@ -304,7 +302,6 @@ class Effect:
         What depends on the parameters alone is computed here, once per rollout; the function
         returned maps a `State` to `[..., object]`, N.
         """
-        return None
 
     def push(self, theta: Theta, scene: Surroundings) -> Push | None:
         """Returns a force with a direction of its own, on what moves freely, or None.
@@ -312,18 +309,15 @@ class Effect:
         The function maps the velocity `[axis]`, m/s, of the one body of a flight, and the time
         since the start, s, to a force `[axis]`, N: x, y (up) and, of a track in space, z.
         """
-        return None
 
     def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """Returns what friction coefficients become, or None.
 
         The function maps a `State` and coefficients `[..., object]` to coefficients.
         """
-        return None
 
     def inertia(self, theta: Theta, scene: Surroundings) -> PerObject | None:
         """Returns the inertia on top of the mass, as a share of it `[..., object]`, or None."""
-        return None
 
     def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
         """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None.
@@ -331,39 +325,30 @@ class Effect:
         In the plane: how far gravity points forward of the picture's vertical, and 0. From above:
         how much the table falls towards x, and towards y.
         """
-        return None
 
     def gravity(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns the acceleration of free fall `[...]`, m/s^2, or None: as declared."""
-        return None
 
     def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns the factor on the speed kept at the foot `[...]`, or None."""
-        return None
 
     def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns the coefficient of restitution between objects `[...]`, or None."""
-        return None
 
     def passed_on(self, theta: Theta, scene: Surroundings) -> tuple[Array, ...] | None:
         """Returns for each pair of neighbours the factor on the momentum in a hit, or None."""
-        return None
 
     def overlap(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns by how much less neighbours are apart at their first hit `[...]`, m, or None."""
-        return None
 
     def stretch(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns by how much its weight stretches a pendulum's thread `[...]`, m, or None."""
-        return None
 
     def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
         """Returns the floor, or None where there is none to bounce on."""
-        return None
 
     def rims(self, theta: Theta, scene: Surroundings) -> Rims | None:
         """Returns what hits of discs do that are seen from above, or None."""
-        return None
 
     def pressure(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns where discs that are seen from above press on the table, or None.
@@ -371,7 +356,6 @@ class Effect:
         Beside their middles, `[..., object, 2]`, as shares of their radii along x and y when they
         are first seen.
         """
-        return None
 
     def oval(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns how far from round the rims of discs are that are seen from above, or None.
@@ -379,11 +363,9 @@ class Effect:
         c and s of the second harmonic of how far they reach, as shares of their radii
         (`rollout/disc_hits.py`), when the discs are first seen: `[..., object, 2]`.
         """
-        return None
 
     def walls(self, theta: Theta, scene: Surroundings) -> Walls | None:
         """Returns the walls off which discs bounce that are seen from above, or None."""
-        return None
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """Returns what follows from the parameters and is worth telling: name to value and unit."""

@@ -27,8 +27,6 @@ NODES, WEIGHTS = legendre.leggauss(8)  # exact for polynomials of degree 15
 
 
 class BoardShape(Effect, where=lambda scene: LENGTH in scene.expected):
-    """The slope's changes along the way, in each clip on its own."""
-
     name = "board_slope"
 
     def parameters(self, scene):

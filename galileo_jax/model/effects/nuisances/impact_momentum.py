@@ -1,4 +1,11 @@
-"""Impact momentum: a hit of bodies does not conserve momentum along the table to the last digit."""
+"""Impact momentum: a hit of bodies does not conserve momentum along the table to the last digit.
+
+A factor f on the momentum that a hit passes on.
+
+    m_rear (v_rear - v_rear') f = m_front (v_front' - v_front)
+
+The motion alone does not tell it from the ratio of the masses, which it makes less certain.
+"""
 
 from galileo_jax.model.effects import Effect, Normal, Parameter
 
@@ -8,13 +15,6 @@ SD = 0.007
 
 
 class ImpactMomentum(Effect, where=lambda scene: len(scene.names) > 1 and not scene.is_level):
-    """A factor f on the momentum that a hit passes on.
-
-        m_rear (v_rear - v_rear') f = m_front (v_front' - v_front)
-
-    The motion alone does not tell it from the ratio of the masses, which it makes less certain.
-    """
-
     name = "impact_momentum"
 
     def parameters(self, scene):

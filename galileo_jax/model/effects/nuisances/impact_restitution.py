@@ -1,4 +1,10 @@
-"""Impact restitution: no real impact is perfectly plastic."""
+"""Impact restitution: no real impact is perfectly plastic.
+
+A small coefficient of restitution between the objects.
+
+Without it a rebound of a few per cent, which every body shows, is taken for a difference
+of friction or mass.
+"""
 
 from galileo_jax.model.effects import Effect, HalfNormal, Parameter
 
@@ -8,12 +14,6 @@ PRIOR = HalfNormal(0.04)
 
 
 class ImpactRestitution(Effect, where=lambda scene: len(scene.names) > 1 and not scene.is_level):
-    """A small coefficient of restitution between the objects.
-
-    Without it a rebound of a few per cent, which every body shows, is taken for a difference
-    of friction or mass.
-    """
-
     name = "impact_restitution"
     unknowns = (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 

@@ -1,14 +1,14 @@
-"""Release instant: the object is let go between two frames, not on one."""
+"""Release instant: the object is let go between two frames, not on one.
+
+Shifts the model's clock: t <- t - release_instant.
+
+What moves already when it is first seen has its clock's zero there.
+"""
 
 from galileo_jax.model.effects import Effect, Normal, Parameter
 
 
 class ReleaseInstant(Effect):
-    """Shifts the model's clock: t <- t - release_instant.
-
-    What moves already when it is first seen has its clock's zero there.
-    """
-
     name = "release_instant"
 
     def parameters(self, scene):

@@ -1,4 +1,10 @@
-"""Start offset: each object starts a few millimetres from where it was marked."""
+"""Start offset: each object starts a few millimetres from where it was marked.
+
+Moves each start along the object's path, downhill positive.
+
+For object 1 it is the distance to the foot, for the others the gap before they are hit. A
+foot that is known no better than `origin_sd_px` shifts all of them.
+"""
 
 from galileo_jax.model.effects import Effect, Normal, Parameter
 from galileo_jax.model.effects.effect import ORIGIN
@@ -7,12 +13,6 @@ SD_M = 0.003  # a point set by hand, sizes declared to a millimetre
 
 
 class StartOffset(Effect, where=lambda scene: scene.has_table):
-    """Moves each start along the object's path, downhill positive.
-
-    For object 1 it is the distance to the foot, for the others the gap before they are hit. A
-    foot that is known no better than `origin_sd_px` shifts all of them.
-    """
-
     name = "start_offset"
 
     def parameters(self, scene):

@@ -16,8 +16,6 @@ SPREAD, SPREAD_FACTOR = 0.03, 1.386  # median, and the standard deviation of its
 
 
 class TrialFriction(Effect, where=lambda scene: scene.has_surface):
-    """A factor on the friction of each object, of each trial another."""
-
     name = "trial_friction"
     spread = "friction_spread"
 
