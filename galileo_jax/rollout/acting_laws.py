@@ -94,8 +94,11 @@ class ActingLaws:
         return kinds
 
     def _share_of(self, kind: int) -> Share:
-        model, laws = self._model, tuple(law for law in self._laws if law.kind & ~kind == 0)
-        left_out = [law.effect for law in self._laws if law not in laws]
+        laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
+        return self._without([law.effect for law in self._laws if law not in laws], laws)
+
+    def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
+        model = self._model
         gone = {int(i) for effect in left_out for i in self._columns(effect)}
         columns = tuple(i for i in range(len(model.names)) if i not in gone)
         effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
