@@ -45,7 +45,7 @@ from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.similarity.discrepancy import SCALE_SD
 from galileo_jax.simulation.motion import roll_out
-from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.ramp_clip import draw_series
 from galileo_jax.simulation.truth import Truth, draw_truth, truth_like
 
 ANGLES_DEG = (10.0, 30.0)

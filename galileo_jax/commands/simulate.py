@@ -8,8 +8,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser, refuse
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.check_settings import option, options_without_part
-from galileo_jax.simulation.settings import Settings
+from galileo_jax.simulation.settings import Settings, option, options_without_part
 
 
 def main(argv: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 """The body engine: a convex body that is thrown onto a plane, from impact to impact, in JAX.
 
-Impacts at corners are met at their time, whatever the steps; between them bodies move by `moreau`'s
+Impacts at corners are met at their time, whatever the steps; between them bodies move by Moreau's
 step. The motion is a continuous function of start and parameters, with JAX's derivatives, as long
 as the order of the impacts stays the same. MuJoCo is the check: tests/rollout/test_engine_body.py.
 """
@@ -9,10 +9,20 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from galileo_jax.rollout.body import Pose, Solid, climbs_m_s, gaps_m, levers_m
+from galileo_jax.rollout.body import (
+    Contacts,
+    Masses,
+    Pose,
+    Solid,
+    climbs_m_s,
+    gaps_m,
+    least_rises_m_s,
+    levers_m,
+    stepped,
+    struck,
+)
 from galileo_jax.rollout.box_impulses import Corners
 from galileo_jax.rollout.events import PLASTIC_M_S, step_by_events, to_crossing
-from galileo_jax.rollout.moreau import Contacts, Masses, least_rises_m_s, stepped, struck
 
 MOST_CONTACTS = 4  # the lowest corners: of a box no more can touch
 MAX_EVENTS = 8  # within one step

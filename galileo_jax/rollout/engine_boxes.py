@@ -6,7 +6,7 @@ begin anew with the hit, whose time Newton's method finds.
 
 A box stands on four corners with Coulomb friction, and meets others with smooth faces. Hits are met
 at their time (conservative advancement along the gap), so that the motion is a continuous function
-of the parameters, with JAX's derivatives; between them boxes move by `moreau`'s step. Corners come
+of the parameters, with JAX's derivatives; between them boxes move by Moreau's step. Corners come
 down onto the table without a rebound, within a step. MuJoCo's C engine is the check:
 tests/rollout/test_engine_boxes.py.
 
@@ -26,7 +26,16 @@ from jaxtyping import Float
 from galileo_jax.model.effects.effect import State, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
-from galileo_jax.rollout.body import Pose, rotation
+from galileo_jax.rollout.body import (
+    Contacts,
+    Masses,
+    Pose,
+    least_rises_m_s,
+    rotation,
+    spins_rad_s,
+    stepped,
+    struck,
+)
 from galileo_jax.rollout.box_faces import NUM_POINTS, Box, Touch, touch
 from galileo_jax.rollout.box_impulses import TINY, Corners, Points
 from galileo_jax.rollout.engine_jax import EngineJax
@@ -48,14 +57,6 @@ from galileo_jax.rollout.free_start import (
     past_the_foot_m,
     record_before_hit,
     with_depths,
-)
-from galileo_jax.rollout.moreau import (
-    Contacts,
-    Masses,
-    least_rises_m_s,
-    spins_rad_s,
-    stepped,
-    struck,
 )
 from galileo_jax.rollout.motion import Dynamics, state_at
 from galileo_jax.runtime.errors import InputError

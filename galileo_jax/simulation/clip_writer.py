@@ -4,12 +4,11 @@ from pathlib import Path
 
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.check_settings import checked
 from galileo_jax.simulation.clip_files import all_or_nothing
 from galileo_jax.simulation.hidden import make_hidden
 from galileo_jax.simulation.plane_clip import plane_clips
 from galileo_jax.simulation.ramp_clip import ramp_clips
-from galileo_jax.simulation.settings import Settings
+from galileo_jax.simulation.settings import Settings, checked
 
 SHARE_DRAWN = 0.2  # of the time, about, that goes into the motions
 

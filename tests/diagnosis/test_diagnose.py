@@ -18,7 +18,7 @@ from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
 from galileo_jax.simulation.hidden import Hidden
-from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.ramp_clip import draw_series
 
 # Of all the library only these: what is near air drag, and what changes the start or the hit.
 CANDIDATES = ("air_drag", "release_delay", "restitution", "viscous_drag")

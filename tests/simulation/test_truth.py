@@ -13,7 +13,7 @@ from galileo_jax.model.parameters import absent
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import roll_out
-from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.ramp_clip import draw_series
 from galileo_jax.simulation.truth import Declared, draw_truth
 from tests.model.effects.motion import LIBRARY
 
