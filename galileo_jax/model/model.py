@@ -21,23 +21,17 @@ FRICTION_PRIOR = Uniform(0.0, 1.0)
 
 @dataclass(frozen=True)
 class Model:
-    """A scene with effects; `theta` vectors follow the order of `parameters`.
+    """A scene with effects; `theta` vectors follow the order of `parameters`."""
 
-    Attributes:
-      scene: the compiled scene.
-      duration_s: how long rollouts last.
-      effects: physical effects that are part of the hypothesis (none is the base model).
-      nuisances: always there, after the scenario's own laws.
-      motion: "planar", or "free": from the first hit on bodies turn and tip.
-      shared: parameters that stand in place of this scene's own of the same name: one prior for
-        the clips of a series, however far each of them sees.
-    """
-
-    scene: Scene
-    duration_s: float
+    scene: Scene  # the compiled scene
+    duration_s: float  # how long rollouts last
+    # Physical effects that are part of the hypothesis (none is the base model)
     effects: tuple[Effect, ...] = ()
+    # Always there, after the scenario's own laws
     nuisances: tuple[Effect, ...] = field(default=LAWS + NUISANCES)
-    motion: str = "planar"
+    motion: str = "planar"  # "planar", or "free": from the first hit on bodies turn and tip
+    # Parameters that stand in place of this scene's own of the same name: one prior for the clips
+    # of a series, however far each of them sees
     shared: tuple[Parameter, ...] = ()
 
     @cached_property

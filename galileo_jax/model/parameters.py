@@ -26,13 +26,9 @@ Numbers = jax.Array | np.ndarray | np.floating
 
 @dataclass(frozen=True)
 class Prior:
-    """A distribution of one number, given by one or two others, as a map from the standard normal.
+    """A distribution of a number, given by one or two others, as a map from the standard normal."""
 
-    Attributes:
-      kind: its row in a `PriorTable`.
-    """
-
-    kind: ClassVar[int]
+    kind: ClassVar[int]  # its row in a `PriorTable`
 
     @staticmethod
     def at(z: Any, a: Any, b: Any, xp: Any) -> Any:
@@ -200,15 +196,10 @@ def joined(one: Parameter, other: Parameter) -> Parameter:
 
 
 class PriorTable(NamedTuple):
-    """Priors as numbers: one compiled program then serves clips whose priors differ.
+    """Priors as numbers: one compiled program then serves clips whose priors differ."""
 
-    Attributes:
-      kind: `[parameter]`, places in `KINDS`.
-      a, b: `[parameter]`, the prior's numbers in the order of its fields.
-    """
-
-    kind: np.ndarray
-    a: np.ndarray
+    kind: np.ndarray  # `[parameter]`, places in `KINDS`
+    a: np.ndarray  # `[parameter]`, the prior's numbers in the order of its fields
     b: np.ndarray
 
     @classmethod
@@ -244,8 +235,8 @@ class PriorTable(NamedTuple):
 
 def in_units(prior: Prior, z: Any) -> np.ndarray:
     """`prior.forward(z)` in NumPy, of z of any shape."""
-    kind, a, b = (np.array([number]) for number in prior.encode())
-    return PriorTable(kind, a, b).in_units(np.asarray(z, float)[..., None])[..., 0]
+    _, a, b = prior.encode()
+    return np.asarray(prior.at(np.asarray(z, float), a, b, np))
 
 
 def _stretched(z: Any) -> Any:

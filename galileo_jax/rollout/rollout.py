@@ -27,16 +27,11 @@ class Trajectory(NamedTuple):
     """Simulated motion of all objects' centres on the engine's own time grid.
 
     Leading batch axes are allowed before the axes named here.
-
-    Attributes:
-      times_s: `[step]`, s since the release, evenly spaced.
-      position_m: `[object, 2, step]`, m; x along the travel, y up, origin at the foot.
-      velocity_m_s: `[object, 2, step]`, m/s.
     """
 
-    times_s: jax.Array
-    position_m: jax.Array
-    velocity_m_s: jax.Array
+    times_s: jax.Array  # `[step]`, s since the release, evenly spaced
+    position_m: jax.Array  # `[object, 2, step]`, m; x along the travel, y up, origin at the foot
+    velocity_m_s: jax.Array  # `[object, 2, step]`, m/s
 
 
 @runtime_checkable

@@ -47,45 +47,27 @@ class State(NamedTuple):
 
 
 class Bounce(NamedTuple):
-    """A level floor; each `[...]`.
+    """A level floor; each `[...]`."""
 
-    Attributes:
-      height_m: of an object's centre when it touches the floor, y as measured.
-      restitution: share of the speed against the floor with which it leaves.
-      grip: share of the speed along the floor that is lost.
-    """
-
-    height_m: Array
-    restitution: Array
-    grip: Array
+    height_m: Array  # of an object's centre when it touches the floor, y as measured
+    restitution: Array  # share of the speed against the floor with which it leaves
+    grip: Array  # share of the speed along the floor that is lost
 
 
 class Rims(NamedTuple):
-    """What happens where the rims of discs meet.
+    """What happens where the rims of discs meet."""
 
-    Attributes:
-      restitution: `[...]`, of the speed along the centres.
-      grip: `[...]`, the most that the impulse across them is, as a share of that along them.
-      offset_m: `[..., object, 2]`, where each disc is beside where it was seen.
-    """
-
-    restitution: Array
-    grip: Array
-    offset_m: Float[AnyArray, "... object 2"]
+    restitution: Array  # `[...]`, of the speed along the centres
+    grip: Array  # `[...]`, the most that the impulse across them is, as a share of that along them
+    offset_m: Float[AnyArray, "... object 2"]  # where each disc is beside where it was seen
 
 
 class Walls(NamedTuple):
-    """Straight walls off which discs bounce that are seen from above.
+    """Straight walls off which discs bounce that are seen from above."""
 
-    Attributes:
-      ends_m: `[..., wall, end, 2]`, the lines that rims touch, as measured.
-      restitution: `[...]`, of the speed against a wall.
-      grip: `[...]`, the most that the impulse along a wall is, as a share of that against it.
-    """
-
-    ends_m: Float[AnyArray, "... wall end 2"]
-    restitution: Array
-    grip: Array
+    ends_m: Float[AnyArray, "... wall end 2"]  # the lines that rims touch, as measured
+    restitution: Array  # `[...]`, of the speed against a wall
+    grip: Array  # `[...]`, the most that the impulse along a wall is, as a share of that against it
 
 
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.

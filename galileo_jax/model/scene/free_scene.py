@@ -11,6 +11,7 @@ from galileo_jax.model.scene.scene import Scene
 from galileo_jax.runtime.errors import InputError
 
 SHAPES = (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER)
+SURFACES = ("ramp", "table")
 SOLVER_ITERATIONS = 50
 # Four corners carry the weight: stiff, and without rebound. The force grows from no
 # penetration, as in scenes/ramp.xml.
@@ -48,22 +49,21 @@ def free_model(scene: Scene, timestep_s: float) -> mujoco.MjModel:
         body.explicitinertial = False
         shape.mass = 1.0
         shape.alt.type, shape.quat = mujoco.mjtOrientation.mjORIENTATION_QUAT, [1, 0, 0, 0]
-        for surface in ("ramp", "table"):
-            _add_pair(spec, f"{name}_{surface}", surface, shape.name, SURFACE_SOLIMP)
+    pairs = [
+        (f"{body}_{surface}", surface, f"{body}_shape", SURFACE_SOLIMP)
+        for body in bodies
+        for surface in SURFACES
+    ]
     for one, other in combinations(bodies, 2):
-        _add_pair(spec, f"{one}_{other}", f"{one}_shape", f"{other}_shape", FACE_SOLIMP)
+        pairs.append((f"{one}_{other}", f"{one}_shape", f"{other}_shape", FACE_SOLIMP))
+    for name, one, other, solimp in pairs:
+        spec.add_pair(
+            name=name,
+            geomname1=one,
+            geomname2=other,
+            condim=3,
+            friction=[SMOOTH, SMOOTH, 0, 0, 0],
+            solref=SURFACE_SOLREF,
+            solimp=solimp,
+        )
     return spec.compile()
-
-
-def _add_pair(
-    spec: mujoco.MjSpec, name: str, one: str, other: str, solimp: tuple[float, ...]
-) -> None:
-    spec.add_pair(
-        name=name,
-        geomname1=one,
-        geomname2=other,
-        condim=3,
-        friction=[SMOOTH, SMOOTH, 0, 0, 0],
-        solref=SURFACE_SOLREF,
-        solimp=solimp,
-    )
