@@ -15,7 +15,7 @@ from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.laws.walls import ENDS as WALL_ENDS
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.simulation.hidden import with_given
-from galileo_jax.simulation.level_hits import Rails, Rims, next_hit, strike, strike_wall
+from galileo_jax.simulation.level_hits import Rails, Rims, Table
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.plane import PlaneTruth
 from galileo_jax.simulation.truth import GRAVITY_M_S2
@@ -94,13 +94,13 @@ def solve_level(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
     place[:, :2] = truth.start_m
     speed[0] = [truth.values[f"{name}1"] for name in START]
     speed[:, 2] *= radii / math.sqrt(2)
-    rails = Rails.of(truth.walls_m)
     beside, oval = np.zeros((count, 2)), None
     for effect in effects:
         if (pressure := effect.pressure(theta, scene)) is not None:
             beside = np.stack([-pressure[:, 1], pressure[:, 0]], axis=1)
         oval = effect.oval(theta, scene) if oval is None else oval
     rims = Rims(radii, np.zeros((count, 2)) if oval is None else np.asarray(oval))
+    table = Table(rims, Rails.of(truth.walls_m), law.mass, truth.values)
     way, hits, rows = np.zeros(count), [], []
     last = round(LONGEST_S / STEP_S)
     for index in range(last + 1):
@@ -116,7 +116,7 @@ def solve_level(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
             lever = math.sqrt(2) * (_turner(turned) @ beside[..., None])[..., 0]
             ended = _rubbed(speed, way, lever, index * STEP_S, left, law, scene)
             mean = (speed + ended) / 2
-            spent, struck = next_hit(place, mean, rims, rails, left)
+            spent, struck = table.next_hit(place, mean, left)
             place, way = place + spent * mean, way + spent * np.hypot(*mean[:, :2].T)
             speed = ended if struck is None else speed + (ended - speed) * (spent / left)
             left -= spent
@@ -124,9 +124,9 @@ def solve_level(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
                 break
             i, other, is_wall = struck
             if is_wall:
-                strike_wall(place, speed, i, rims, rails, other, truth.values)
+                table.strike_wall(place, speed, i, other)
             else:
-                strike(place, speed, i, other, rims, law, truth.values)
+                table.strike(place, speed, i, other)
                 hits.append((index + 1) * STEP_S - left)
     places, speeds = (np.moveaxis(np.array(each), 0, -1) for each in zip(*rows, strict=True))
     times = STEP_S * STEPS_PER_RECORD * np.arange(len(rows))

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from galileo_jax.rollout.motion import Dynamics
 from galileo_jax.simulation.plane import Point
 from galileo_jax.simulation.solver import PLASTIC_M_S
 
@@ -90,39 +89,79 @@ class Rails(NamedTuple):
         return np.where(ahead, meets, np.inf)
 
 
-def next_hit(
-    place: np.ndarray, mean: np.ndarray, rims: Rims, rails: Rails, left_s: float
-) -> tuple[float, tuple[int, int, bool] | None]:
-    """When the first hit within `left_s` is, s, and what hits what: a puck, or a wall."""
-    soonest, struck = left_s, None
-    for i, j in combinations(range(len(place)), 2):
+class Table(NamedTuple):
+    """Pucks and what they meet."""
+
+    rims: Rims
+    rails: Rails
+    mass_kg: np.ndarray
+    values: Mapping[str, float]  # parameters by name
+
+    def next_hit(
+        self, place: np.ndarray, mean: np.ndarray, left_s: float
+    ) -> tuple[float, tuple[int, int, bool] | None]:
+        """When the first hit within `left_s` is, s, and what hits what: a puck, or a wall."""
+        rims, rails = self.rims, self.rails
+        soonest, struck = left_s, None
+        for i, j in combinations(range(len(place)), 2):
+            if rims.are_round:
+                reach = rims.radius_m[i] + rims.radius_m[j]
+                meets = _meets_s(place[j] - place[i], mean[j] - mean[i], reach)
+            else:
+                meets = self._ovals_meet_s(place, mean, i, j, left_s)
+            if meets < soonest:
+                soonest, struck = meets, (i, j, False)
+        for i in range(len(place)) if len(rails.length) else ():
+            meets = rails.meets_s(place, mean, i, rims)
+            wall = int(np.argmin(meets))
+            if meets[wall] < soonest:
+                soonest, struck = float(meets[wall]), (i, wall, True)
+        return soonest, struck
+
+    def _ovals_meet_s(
+        self, place: np.ndarray, mean: np.ndarray, i: int, j: int, left_s: float
+    ) -> float:
+        """As `_meets_s`, within `left_s`, as if the gap closed evenly."""
+        rims = self.rims
+        most = 2 * (rims.radius_m[i] + rims.radius_m[j])
+        if np.hypot(*(place[j] - place[i])[:2]) > most:
+            return math.inf
+        now = rims.facing(place, i, j)[1]
+        then = rims.facing(place + left_s * mean, i, j)[1]
+        if then >= 0 or then >= now - CLOSES_M:
+            return math.inf
+        return left_s * max(now, 0.0) / (now - then)
+
+    def strike_wall(self, place: np.ndarray, speed: np.ndarray, i: int, wall: int) -> None:
+        """Changes the speed of a puck by the impulse of a wall."""
+        rims, rails, values = self.rims, self.rails, self.values
+        normal = rails.left[wall]
+        if (place[i, :2] - rails.start_m[wall]) @ normal < 0:  # it is on the wall's other side
+            normal = -normal
+        point = rims.touching_m(place, i, math.atan2(-normal[1], -normal[0]))
+        radius = rims.radius_m[i]
+        u, gives = _at(point, speed[i], radius, 1.0)
+        impulse = _impulse(u, gives, normal, values["wall_restitution"], values["wall_grip"])
+        _push(speed[i], impulse, point, radius, 1.0)
+
+    def strike(self, place: np.ndarray, speed: np.ndarray, i: int, j: int) -> None:
+        """Changes the speeds by the impulses of a hit of two pucks."""
+        rims, mass, values = self.rims, self.mass_kg, self.values
         if rims.are_round:
-            reach = rims.radius_m[i] + rims.radius_m[j]
-            meets = _meets_s(place[j] - place[i], mean[j] - mean[i], reach)
+            x, y = (place[j] - place[i])[:2]
+            angle = math.atan2(y, x)
         else:
-            meets = _ovals_meet_s(place, mean, i, j, rims, left_s)
-        if meets < soonest:
-            soonest, struck = meets, (i, j, False)
-    for i in range(len(place)) if len(rails.length) else ():
-        meets = rails.meets_s(place, mean, i, rims)
-        wall = int(np.argmin(meets))
-        if meets[wall] < soonest:
-            soonest, struck = float(meets[wall]), (i, wall, True)
-    return soonest, struck
-
-
-def _ovals_meet_s(
-    place: np.ndarray, mean: np.ndarray, i: int, j: int, rims: Rims, left_s: float
-) -> float:
-    """As `_meets_s`, within `left_s`, as if the gap closed evenly."""
-    most = 2 * (rims.radius_m[i] + rims.radius_m[j])
-    if np.hypot(*(place[j] - place[i])[:2]) > most:
-        return math.inf
-    now = rims.facing(place, i, j)[1]
-    then = rims.facing(place + left_s * mean, i, j)[1]
-    if then >= 0 or then >= now - CLOSES_M:
-        return math.inf
-    return left_s * max(now, 0.0) / (now - then)
+            angle, _ = rims.facing(place, i, j)
+        points = [rims.touching_m(place, k, a) for k, a in ((i, angle), (j, angle + math.pi))]
+        ends = [
+            _at(point, speed[k], rims.radius_m[k], mass[k])
+            for point, k in zip(points, (i, j), strict=True)
+        ]
+        u, gives = ends[1][0] - ends[0][0], ends[1][1] + ends[0][1]
+        normal = np.array([math.cos(angle), math.sin(angle)])
+        impulse = _impulse(u, gives, normal, values["restitution"], values["grip"])
+        _push(speed[i], -impulse, points[0], rims.radius_m[i], mass[i])
+        _push(speed[j], impulse, points[1], rims.radius_m[j], mass[j])
 
 
 def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
@@ -133,53 +172,6 @@ def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
     square, gap = float(u[:2] @ u[:2]), float(apart[:2] @ apart[:2]) - reach**2
     root2 = closing**2 - square * gap
     return max(gap, 0.0) / (math.sqrt(root2) - closing) if root2 > 0 else math.inf
-
-
-def strike_wall(
-    place: np.ndarray,
-    speed: np.ndarray,
-    i: int,
-    rims: Rims,
-    rails: Rails,
-    wall: int,
-    values: Mapping[str, float],
-) -> None:
-    """Changes the speed of a puck by the impulse of a wall."""
-    normal = rails.left[wall]
-    if (place[i, :2] - rails.start_m[wall]) @ normal < 0:  # it is on the wall's other side
-        normal = -normal
-    point = rims.touching_m(place, i, math.atan2(-normal[1], -normal[0]))
-    radius = rims.radius_m[i]
-    u, gives = _at(point, speed[i], radius, 1.0)
-    impulse = _impulse(u, gives, normal, values["wall_restitution"], values["wall_grip"])
-    _push(speed[i], impulse, point, radius, 1.0)
-
-
-def strike(
-    place: np.ndarray,
-    speed: np.ndarray,
-    i: int,
-    j: int,
-    rims: Rims,
-    law: Dynamics,
-    values: Mapping[str, float],
-) -> None:
-    """Changes the speeds by the impulses of a hit of two pucks."""
-    if rims.are_round:
-        x, y = (place[j] - place[i])[:2]
-        angle = math.atan2(y, x)
-    else:
-        angle, _ = rims.facing(place, i, j)
-    points = [rims.touching_m(place, k, a) for k, a in ((i, angle), (j, angle + math.pi))]
-    ends = [
-        _at(point, speed[k], rims.radius_m[k], law.mass[k])
-        for point, k in zip(points, (i, j), strict=True)
-    ]
-    u, gives = ends[1][0] - ends[0][0], ends[1][1] + ends[0][1]
-    normal = np.array([math.cos(angle), math.sin(angle)])
-    impulse = _impulse(u, gives, normal, values["restitution"], values["grip"])
-    _push(speed[i], -impulse, points[0], rims.radius_m[i], law.mass[i])
-    _push(speed[j], impulse, points[1], rims.radius_m[j], law.mass[j])
 
 
 def _at(
