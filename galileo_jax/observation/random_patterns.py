@@ -9,8 +9,7 @@ SMALLEST = 1e-3  # of the largest pattern's variance; what is smaller is left ou
 
 
 def random_patterns(
-    covariance: Float[np.ndarray, "frame frame"],
-    smallest: float = SMALLEST,
+    covariance: Float[np.ndarray, "frame frame"], smallest: float = SMALLEST
 ) -> Float[np.ndarray, "pattern frame"]:
     """The patterns of a covariance, each times the standard deviation of its amplitude.
 

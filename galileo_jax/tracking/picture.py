@@ -6,7 +6,6 @@ import numpy as np
 from galileo_jax.tracking.pose import SHARP_PX, smeared_along, square_around
 
 MARGIN_PX = 6  # by which an object may move before more of the frame is smoothed
-PART_MARGIN_PX = 24  # more that a kept part holds: room for the alignment and the smoothing
 UPSAMPLED_TO_PX = 2.0  # what is smoothed less than this is kept at twice the frame's resolution
 PYRAMID_VARIANCE_PX2 = 0.25  # of OpenCV's `pyrUp`, which smooths half pixels by (1 4 6 4 1) / 16
 LINEAR_SHARE = 1 / 6  # of h^2: the variance of linear interpolation between samples h apart
@@ -22,36 +21,17 @@ class Picture:
     patch anew, after Lanczos interpolation, took 60 times as long.
     """
 
-    def __init__(
-        self,
-        grey: np.ndarray,
-        corner_px: tuple[int, int] = (0, 0),
-        size_px: tuple[int, int] | None = None,
-    ):
-        """The frame `[height, width]` uint8, or a part of it from `corner_px` on."""
+    def __init__(self, grey: np.ndarray):
+        """The frame, `[height, width]` uint8."""
         self.grey = grey
-        self._corner_px = corner_px
-        self.size_px = (grey.shape[1], grey.shape[0]) if size_px is None else size_px
+        self.size_px = grey.shape[1], grey.shape[0]
         self._windows: dict[float, _Window] = {}
         self._smeared: dict[tuple[float, float], Picture] = {}
 
-    def part(self, pose: np.ndarray, reach_px: float) -> "Picture":
-        """A copy of what is within `reach_px` of the pose's point, and of what smoothing needs."""
-        reach = int(np.ceil(reach_px)) + PART_MARGIN_PX + 1
-        cut, (left, top) = square_around(self.grey, pose[:2] - self._corner_px, reach)
-        x, y = self._corner_px
-        return Picture(cut.copy(), (left + x, top + y), self.size_px)
-
-    def forget(self) -> None:
-        """Frees what was smoothed and smeared, which takes many times the picture's own memory."""
-        self._windows.clear()
-        self._smeared.clear()
-
     def window(self, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
         """The pixels from `low` to `high` (x, y), both within, float32; None: not all are seen."""
-        (left, top), (right, bottom) = low - self._corner_px, high - self._corner_px
-        height, width = self.grey.shape
-        if left < 0 or top < 0 or right >= width or bottom >= height:
+        (left, top), (right, bottom) = low, high
+        if (low < 0).any() or (high >= self.size_px).any():
             return None
         return self.grey[top : bottom + 1, left : right + 1].astype(np.float32)
 
@@ -63,8 +43,7 @@ class Picture:
         if (x, y) not in self._smeared:
             if len(self._smeared) >= MAX_SMEARED:
                 self._smeared.clear()
-            grey = smeared_along(self.grey, np.array([x, y]))
-            self._smeared[x, y] = Picture(grey, self._corner_px, self.size_px)
+            self._smeared[x, y] = Picture(smeared_along(self.grey, np.array([x, y])))
         return self._smeared[x, y]
 
     def at(self, pose: np.ndarray, own: np.ndarray, reach_px: float, width_px: float) -> np.ndarray:
@@ -75,11 +54,9 @@ class Picture:
         frame is continued by its last pixels.
         """
         window = self._windows.get(width_px)
-        place = pose[:2] - self._corner_px
-        if window is None or not window.holds(place, reach_px):
-            window = _Window(self.grey, place, reach_px, width_px)
-            self._windows[width_px] = window
-        return window.at(place, pose[2], own)
+        if window is None or not window.holds(pose[:2], reach_px):
+            window = self._windows[width_px] = _Window(self.grey, pose[:2], reach_px, width_px)
+        return window.at(pose[:2], pose[2], own)
 
 
 class _Window:

@@ -115,11 +115,7 @@ def _seen(
 
 
 def _at_mid_exposure(
-    poses: np.ndarray,
-    noise: np.ndarray,
-    exposure_share: float,
-    piece: Piece,
-    clock: np.ndarray,
+    poses: np.ndarray, noise: np.ndarray, exposure_share: float, piece: Piece, clock: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The poses without what blows within an exposure shift them, and the noise with the rest."""
     jumps = np.zeros((len(poses), 2))

@@ -1,7 +1,6 @@
-"""Tracking a video: two passes, of which the second sees what the first kept around the objects."""
+"""Tracking a video in two passes."""
 
-import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
@@ -20,7 +19,6 @@ from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
 FIELDS = tuple(field.name for field in fields(Finished))
-MAX_KEPT_BYTES = 256 << 20  # of a longer video the second pass decodes the frames again
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ def track_video(
 
     Args:
       open_frames: gives the frames from the beginning, `[height, width, 3]` uint8, BGR (or
-        grey); called again if the video is long.
+        grey); called for each pass.
       starts: at least one.
       times_s: `[frame]`, increasing, when each was taken.
       coding: how the frames were coded. None: each for itself.
@@ -83,7 +81,6 @@ class _FirstPass:
     """What following from frame to frame gives."""
 
     pieces: list[list[Piece]]  # of each start
-    kept: "_Kept"  # what is around the objects
     exposure: Exposure  # as far as smears show it
     count: int = 0  # of frames
     size_px: tuple[int, int] = (0, 0)  # of the picture
@@ -96,7 +93,7 @@ def _from_frame_to_frame(
     advance: Callable[[Seen | None], None],
 ) -> _FirstPass:
     """The first pass of `track_video`; `clock` in usual steps."""
-    first = _FirstPass([[] for _ in starts], _Kept(len(starts)), Exposure())
+    first = _FirstPass([[] for _ in starts], Exposure())
     pieces, before = first.pieces, None
     for index, frame in enumerate(open_frames()):
         picture = Picture(grey(frame))
@@ -106,8 +103,6 @@ def _from_frame_to_frame(
             step = clock[index] - clock[index - 1] if index else 1.0
             follow_on(pieces[k], starts[k], index, before, picture, first.exposure, beside, step)
         keep_apart([pieces[k][-1] for k in used], index, before, picture)
-        for k in used:
-            first.kept.add(k, index, picture, pieces[k][-1].follower)
         before = picture
         first.count, first.size_px = index + 1, picture.size_px
         advance(Seen(index, tuple(_place(own, index) for own in pieces)))
@@ -122,64 +117,30 @@ def _in_every_frame(
 ) -> tuple[list[float], list[list[Refined | None]]]:
     """The second pass: of each piece its shares of a frame's time, and its pose in each frame."""
     looks = [
-        _Look(k, piece, piece.poses(first.count), _final_template(piece.follower))
-        for k, own in enumerate(first.pieces)
+        _Look(piece, piece.poses(first.count), _final_template(piece.follower))
+        for own in first.pieces
         for piece in own
     ]
     shares = _learnt(first, looks, open_frames, clock)
     fits: list[list[Refined | None]] = [[] for _ in looks]
-    for index, pictures in enumerate(first.kept.pictures(open_frames, first.count)):
+    for index, frame in zip(range(first.count), open_frames(), strict=False):
+        picture = Picture(grey(frame))
         for look, share, found in zip(looks, shares, fits, strict=True):
-            picture, pose = pictures[look.k], look.poses[index]
-            if picture is None or not np.isfinite(pose[0]):
-                found.append(None)
-                continue
-            velocities = look.piece.velocities(look.poses, index, clock)
-            found.append(refine_pose(picture, look.template, pose, velocities, share))
+            fit, pose = None, look.poses[index]
+            if np.isfinite(pose[0]):
+                velocities = look.piece.velocities(look.poses, index, clock)
+                fit = refine_pose(picture, look.template, pose, velocities, share)
+            found.append(fit)
         advance(None)
     return shares, fits
 
 
 class _Look(NamedTuple):
-    """A piece of object `k` after the first pass: poses `[frame, 3]`, and its final template."""
+    """A piece after the first pass: its poses `[frame, 3]`, and its final template."""
 
-    k: int
     piece: Piece
     poses: np.ndarray
     template: Template
-
-
-class _Kept:
-    """What the first pass saw of the objects, so that the second need not decode the video."""
-
-    def __init__(self, num_objects: int):
-        self._parts: list[dict[int, Picture]] | None = [{} for _ in range(num_objects)]
-        self._num_objects, self._bytes = num_objects, 0
-
-    def add(self, k: int, index: int, picture: Picture, follower: Follower) -> None:
-        """Keeps the part of a frame in which object `k` was found."""
-        pose = follower.poses[-1]
-        if self._parts is None or not np.isfinite(pose[0]):
-            return
-        part = picture.part(pose, follower.template.radius)
-        self._parts[k][index] = part
-        self._bytes += part.grey.nbytes
-        if self._bytes > MAX_KEPT_BYTES:
-            self._parts = None
-
-    def pictures(
-        self, open_frames: Callable[[], Iterable[np.ndarray]], count: int
-    ) -> Iterator[list[Picture | None]]:
-        """For every frame what is there of every object; decodes again where it was too much."""
-        if self._parts is not None:
-            for index in range(count):
-                pictures = [parts.get(index) for parts in self._parts]
-                yield pictures
-                for picture in filter(None, pictures):
-                    picture.forget()
-            return
-        for frame in itertools.islice(open_frames(), count):
-            yield [Picture(grey(frame))] * self._num_objects
 
 
 def _final_template(follower: Follower) -> Template:
@@ -204,10 +165,11 @@ def _learnt(
     asked = [k for k in range(len(looks)) if k in own or not is_learnt]
     as_sharp = {k: replace(looks[k].template, moved=np.zeros(3)) for k in asked}
     if asked:
-        for index, pictures in enumerate(first.kept.pictures(open_frames, first.count)):
+        for index, frame in zip(range(first.count), open_frames(), strict=False):
+            picture = Picture(grey(frame))
             for k in asked:
-                picture, poses = pictures[looks[k].k], looks[k].poses
-                if picture is not None and np.isfinite(poses[index, 0]):
+                poses = looks[k].poses
+                if np.isfinite(poses[index, 0]):
                     told = velocities_at(poses, index, clock)
                     velocity = (told.before + told.after) / 2
                     into = own.get(k, first.exposure)

@@ -7,15 +7,13 @@ import pytest
 
 from galileo_jax.measurement.average_rows import MOST_ROWS, with_rows_averaged
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
+from tests.measurement.seen import seen
 
 SD_M = 5e-4
 
 
-def seen(way_m: np.ndarray, times_s: np.ndarray, seed: int = 0) -> Observation:
-    place = np.stack([way_m, -0.3 * way_m])[None]
-    place = place + SD_M * np.random.default_rng(seed).standard_normal(place.shape)
-    error = np.broadcast_to(SD_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(times_s)))
-    return Observation(("object1",), times_s, place, error, np.ones((1, len(times_s)), bool))
+def went(way_m: np.ndarray, times_s: np.ndarray) -> Observation:
+    return seen(np.stack([way_m, -0.3 * way_m]), times_s, SD_M, seed=0)
 
 
 def swing(times_s: np.ndarray) -> np.ndarray:
@@ -26,7 +24,7 @@ def swing(times_s: np.ndarray) -> np.ndarray:
 def test_means_are_right_within_their_errors(count):
     """Also where the path bends: a swing of 10 cm has 90 rows in its period."""
     times = np.arange(count) / 60
-    averaged, said = with_rows_averaged(seen(swing(times), times))
+    averaged, said = with_rows_averaged(went(swing(times), times))
     assert len(averaged.times_s) < 1.2 * MOST_ROWS
     sd = np.sqrt(averaged.covariance_m2[0, 0, 0])
     assert np.median(sd) < 0.8 * SD_M
@@ -38,7 +36,7 @@ def test_means_are_right_within_their_errors(count):
 def test_nothing_is_lost():
     """What the rows tell of a straight line the means tell as well, within a tenth."""
     times = np.arange(2000) / 60
-    whole = seen(0.3 * times, times)
+    whole = went(0.3 * times, times)
     averaged, _ = with_rows_averaged(whole)
 
     def slope_sd(one: Observation) -> float:
@@ -52,7 +50,7 @@ def test_nothing_is_lost():
 def test_rows_at_a_blow_and_a_gap_stay_as_they_are():
     times = np.arange(1600) / 400
     way = 5 * np.abs(times - 2.0)  # 5 m/s, and back
-    observation = seen(way, times)
+    observation = went(way, times)
     mask = observation.mask.copy()
     mask[0, 300:303] = False
     averaged, _ = with_rows_averaged(replace(observation, mask=mask))
@@ -73,7 +71,7 @@ def test_what_is_known_along_a_line_stays_known_along_it_alone():
     way = 5 * np.abs(times - 2.0) + SD_M * np.random.default_rng(0).standard_normal(1600)
     error = SD_M**2 * np.outer(along, along) + UNMEASURED_SD_M**2 * np.outer(across, across)
     whole = replace(
-        seen(way, times),
+        went(way, times),
         position_m=np.einsum("a,t->at", along, way)[None],
         covariance_m2=np.broadcast_to(error[None, :, :, None], (1, 2, 2, 1600)),
     )
@@ -90,14 +88,14 @@ def test_shared_errors_are_averaged_alike():
     times = np.arange(1200) / 60
     drift = np.zeros((1, 1, 2, 1200))
     drift[0, 0, 0] = times / times[-1]
-    averaged, _ = with_rows_averaged(replace(seen(swing(times), times), modes_m=drift))
+    averaged, _ = with_rows_averaged(replace(went(swing(times), times), modes_m=drift))
     assert averaged.modes_m is not None
     assert averaged.modes_m[0, 0, 0] == pytest.approx(averaged.times_s / times[-1])
 
 
 def test_a_short_track_stays_as_it_is():
     times = np.arange(MOST_ROWS) / 60
-    observation = seen(swing(times), times)
+    observation = went(swing(times), times)
     assert with_rows_averaged(observation) == (observation, [])
 
 
@@ -105,7 +103,7 @@ def test_an_error_that_nobody_knows_of_a_row_that_was_not_seen_stays_there():
     times = np.arange(1600) / 60
     mask = np.ones((1, 1600), bool)
     mask[0, [0, 800]] = False
-    whole = seen(swing(times), times)
+    whole = went(swing(times), times)
     position = np.where(mask[:, None], whole.position_m, np.nan)
     covariance = np.where(mask[:, None, None], whole.covariance_m2, np.nan)
     gappy = replace(whole, position_m=position, covariance_m2=covariance, mask=mask)

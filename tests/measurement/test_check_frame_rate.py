@@ -15,6 +15,7 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.check_frame_rate import apparent_gravity, frame_rate_doubt
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen as observed_at
 from tests.oracle_run import HIT, make_run
 from tests.reference_ramp import solve
 
@@ -27,21 +28,16 @@ def ramp(tmp_path) -> tuple[Clip, Observation]:
     clip = make_run(tmp_path, HIT, 1.6).clip.model_copy(update={"fps": FPS})
     times = np.arange(96) / FPS
     centres = solve(HIT, times).position_m
-    noise = NOISE_M * np.random.default_rng(0).standard_normal(centres.shape)
-    covariance = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, ..., None], (2, 2, 2, 96))
-    seen = np.ones((2, 96), bool)
-    return clip, Observation(("object1", "object2"), times, centres + noise, covariance, seen)
+    return clip, observed_at(centres, times, NOISE_M, seed=0)
 
 
 def fall(tmp_path, gravity: float = 9.81) -> tuple[Clip, Observation]:
     times = np.arange(40) / FPS
     away = np.maximum(times - 0.1, 0.0)
     y = 1.5 - 0.5 * gravity * away**2 + NOISE_M * np.random.default_rng(0).standard_normal(40)
-    position = np.stack([0 * y, y])[None]
-    covariance = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, ..., None], (1, 2, 2, 40))
-    seen = Observation(("ball",), times, position, covariance, np.ones((1, 40), bool))
+    seen = observed_at(np.stack([0 * y, y]), times, NOISE_M)
     write_observation_csv(tmp_path / "fall.csv", seen)
-    ball = {"name": "ball", "shape": "sphere", "size_m": [0.03]}
+    ball = {"name": "object1", "shape": "sphere", "size_m": [0.03]}
     keys = {"track": "fall.csv", "scenario": "fall", "fps": FPS, "objects": [ball]}
     (tmp_path / "fall.yaml").write_text(yaml.safe_dump(keys))
     return load_clip(tmp_path / "fall.yaml"), seen

@@ -12,6 +12,7 @@ from galileo_jax.measurement.segments.blow import arrest_frame, blow_frame
 from galileo_jax.measurement.segments.handling import hand_frame
 from galileo_jax.measurement.segments.segments import HELD, STOPPED, STRUCK, Segments, segment
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 NOISE_M = 1e-4
 DOWN = np.array([np.cos(0.4), -np.sin(0.4)])
@@ -20,12 +21,7 @@ DOWN = np.array([np.cos(0.4), -np.sin(0.4)])
 def slid(speed_m_s: np.ndarray, fps: float, seed: int = 0) -> Observation:
     """An object that goes `speed_m_s` `[step]` down a board."""
     way = np.concatenate([[0.0], np.cumsum(speed_m_s) / fps])
-    place = way * DOWN[:, None]
-    place = place + NOISE_M * np.random.default_rng(seed).standard_normal(place.shape)
-    count = len(way)
-    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count))
-    seen = np.ones((1, count), bool)
-    return Observation(("object1",), np.arange(count) / fps, place[None], error, seen)
+    return seen(way * DOWN[:, None], np.arange(len(way)) / fps, NOISE_M, seed)
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])
@@ -60,9 +56,9 @@ STOPS = np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5))
 
 def write_clip(folder: Path, scenario: str, more: str = "", speed_m_s=STOPS) -> Path:
     """A run, with a stop at its end if nothing else is said: its csv and yaml; returns the yaml."""
-    seen = slid(speed_m_s, 60.0)
+    run = slid(speed_m_s, 60.0)
     rows = [
-        f"{t},{x},{y},{NOISE_M}" for t, x, y in zip(seen.times_s, *seen.position_m[0], strict=True)
+        f"{t},{x},{y},{NOISE_M}" for t, x, y in zip(run.times_s, *run.position_m[0], strict=True)
     ]
     head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
     (folder / "run.csv").write_text("\n".join([head, *rows]) + "\n")
@@ -76,8 +72,8 @@ def write_clip(folder: Path, scenario: str, more: str = "", speed_m_s=STOPS) -> 
 
 def test_what_follows_is_left_out_and_it_is_said(tmp_path):
     measured = measure(load_clip(write_clip(tmp_path, "fall")))
-    seen = measured.observation.mask[0]
-    assert len(seen) == 60 and seen.all(), "frames that are left out at the end cost no time"
+    mask = measured.observation.mask[0]
+    assert len(mask) == 60 and mask.all(), "frames that are left out at the end cost no time"
     assert measured.observation.times_s[-1] == pytest.approx(59 / 60)
     (remark,) = measured.remarks
     assert (
@@ -92,10 +88,10 @@ def test_what_follows_is_left_out_and_it_is_said(tmp_path):
 def test_a_declared_floor_is_in_the_scene(tmp_path):
     """What bounces on it is not cut off."""
     clip = load_clip(write_clip(tmp_path, "fall", "floor: true\n"))
-    seen = slid(np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5)), 60.0)
-    assert segment(clip, seen) == Segments()
+    run = slid(STOPS, 60.0)
+    assert segment(clip, run) == Segments()
     bare = clip.model_copy(update={"floor": False})
-    (stop,) = segment(bare, seen).cuts
+    (stop,) = segment(bare, run).cuts
     assert stop.time_s == pytest.approx(59 / 60)
 
 
@@ -106,9 +102,9 @@ def test_a_blow_ends_the_run(fps, kept):
     """The block bounces off the end stop, or passes it with less speed, and slides on."""
     rest, way = np.zeros(int(0.4 * fps)), 1.2 * np.arange(1, int(1.06 * fps)) / fps
     on = kept * way[-1] + 1.2 * np.arange(1, int(0.5 * fps)) / fps
-    seen = slid(np.concatenate([rest, way, on]), fps)
-    assert blow_frame(seen) == len(rest) + len(way)
-    assert hand_frame(seen) is None
+    run = slid(np.concatenate([rest, way, on]), fps)
+    assert blow_frame(run) == len(rest) + len(way)
+    assert hand_frame(run) is None
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -122,16 +118,14 @@ def test_a_bounce_between_two_frames_ends_the_flight_before_it(seed):
     height = 2.2 * (hit_s - read_s) + 4.0 * since - 4.9 * (read_s - hit_s) ** 2
     place = np.stack([0.4 * read_s, height, 8.0 * read_s - 1.5 * since])
     place = place + 7e-4 * rng.standard_normal(place.shape)
-    error = np.broadcast_to(2e-3**2 * np.eye(3)[None, :, :, None], (1, 3, 3, 60))
-    seen = Observation(("object1",), times, place[None], error, np.ones((1, 60), bool))
-    assert blow_frame(seen) == 22
+    assert blow_frame(seen(place, times, 2e-3)) == 22
 
 
 def test_one_bad_point_is_no_blow():
     way = 1.2 * np.arange(1, 240) / 240
-    seen = slid(way, 240.0)
-    seen.position_m[0, :, 150] += 0.02
-    assert blow_frame(seen) is None
+    run = slid(way, 240.0)
+    run.position_m[0, :, 150] += 0.02
+    assert blow_frame(run) is None
 
 
 @pytest.mark.parametrize("finger", [0.2, 3.0], ids=["holds it back", "pushes it"])
@@ -146,8 +140,8 @@ def test_the_hand_is_found(finger):
 
 
 def test_a_late_release_is_no_hand():
-    seen = slid(np.concatenate([np.zeros(700), 1.2 * np.arange(1, 200) / 240]), 240.0)
-    assert hand_frame(seen) is None
+    late = np.concatenate([np.zeros(700), 1.2 * np.arange(1, 200) / 240])
+    assert hand_frame(slid(late, 240.0)) is None
 
 
 def test_a_held_and_struck_run_is_what_lies_between(tmp_path):
@@ -176,9 +170,7 @@ def test_the_frames_of_a_blow_go_too(steps):
     speed = np.concatenate([np.full(12, -2.4), way, np.full(26, 2.4)])
     y = np.concatenate([[0.0], np.cumsum(speed / 250)])
     place = np.stack([0.8 * np.arange(len(y)) / 250, y]) + sd * rng.standard_normal((2, len(y)))
-    error = np.broadcast_to(sd**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(y)))
-    times, mask = np.arange(len(y)) / 250, np.ones((1, len(y)), bool)
-    assert blow_frame(Observation(("object1",), times, place[None], error, mask)) == 12
+    assert blow_frame(seen(place, np.arange(len(y)) / 250, sd)) == 12
 
 
 def flight_with_clock(clock: np.ndarray, bounce: float | None = None) -> Observation:
@@ -188,12 +180,7 @@ def flight_with_clock(clock: np.ndarray, bounce: float | None = None) -> Observa
         half = len(clock) // 2
         since = clock[half:] - clock[half]
         place[0, half:] += (bounce - 1.5) * since
-    place += 3e-4 * np.random.default_rng(8).standard_normal(place.shape)
-    count = len(clock)
-    covariance = np.tile(9e-8 * np.eye(2)[None, ..., None], (1, 1, 1, count))
-    return Observation(
-        ("ball",), np.arange(count) / 60, place[None], covariance, np.ones((1, count), bool)
-    )
+    return seen(place, np.arange(len(clock)) / 60, 3e-4, seed=8)
 
 
 def test_slow_motion_within_a_film_is_named(tmp_path):

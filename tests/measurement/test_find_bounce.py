@@ -10,6 +10,7 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.blow import bounce_frame
 from galileo_jax.measurement.segments.segments import STRUCK
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 FPS, FRAMES, AT = 145.0, 50, 22
 
@@ -36,10 +37,8 @@ def flown(seed: int, rebound: float | None, late_s: float = 0.0) -> Observation:
         velocity = velocity + force * 1e-4
         place = place + velocity * 1e-4
         path.append(place)
-    seen = np.stack([np.interp(read_s, fine, axis) for axis in np.transpose(path)])
-    seen += 7e-4 * rng.standard_normal(seen.shape)
-    error = np.broadcast_to(2e-3**2 * np.eye(3)[None, :, :, None], (1, 3, 3, FRAMES))
-    return Observation(("object1",), times, seen[None], error, np.ones((1, FRAMES), bool))
+    shown = np.stack([np.interp(read_s, fine, axis) for axis in np.transpose(path)])
+    return seen(shown + 7e-4 * rng.standard_normal(shown.shape), times, 2e-3)
 
 
 @pytest.mark.parametrize("rebound", [0.6, 0.9])
@@ -57,17 +56,17 @@ def test_times_that_jump_are_no_bounce() -> None:
 
 
 def test_too_few_frames_tell_nothing() -> None:
-    seen = flown(0, 0.9)
-    seen.mask[:, AT + 3 :] = False
-    seen.mask[:, : AT - 1] = False
-    assert bounce_frame(seen) is None
+    short = flown(0, 0.9)
+    short.mask[:, AT + 3 :] = False
+    short.mask[:, : AT - 1] = False
+    assert bounce_frame(short) is None
 
 
 def test_a_flight_in_space_ends_where_it_bounces(tmp_path: Path) -> None:
-    seen = flown(4, 0.6)  # which is too faint for `blow_frame`
+    ball = flown(4, 0.6)  # which is too faint for `blow_frame`
     rows = [
         ",".join(f"{value:.5f}" for value in row)
-        for row in zip(seen.times_s, *seen.position_m[0], strict=True)
+        for row in zip(ball.times_s, *ball.position_m[0], strict=True)
     ]
     head = "time_s,object1_x_m,object1_y_m,object1_z_m"
     (tmp_path / "ball.csv").write_text("\n".join([head, *rows]) + "\n")

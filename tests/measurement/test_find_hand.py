@@ -6,15 +6,13 @@ from scipy.integrate import solve_ivp
 
 from galileo_jax.measurement.segments.handling import thrown_frame
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 G = np.array([0.0, -9.81])
 
 
-def seen(times: np.ndarray, place: np.ndarray, noise_m: float) -> Observation:
-    axes, frames = place.shape
-    place = place + noise_m * np.random.default_rng(1).standard_normal(place.shape)
-    covariance = np.tile(noise_m**2 * np.eye(axes)[None, ..., None], (1, 1, 1, frames))
-    return Observation(("ball",), times, place[None], covariance, np.ones((1, frames), bool))
+def noisy(times: np.ndarray, place: np.ndarray, noise_m: float) -> Observation:
+    return seen(place, times, noise_m, seed=1)
 
 
 def thrown(fps: float, hand_s: float, drag_per_m: float = 0.0, lasts_s: float = 0.9) -> tuple:
@@ -39,7 +37,7 @@ def thrown(fps: float, hand_s: float, drag_per_m: float = 0.0, lasts_s: float = 
 @pytest.mark.parametrize("drag_per_m", [0.0, 0.1])
 def test_a_throw_begins_when_the_hand_is_off(fps: float, drag_per_m: float) -> None:
     times, place = thrown(fps, hand_s=0.16, drag_per_m=drag_per_m)
-    first = thrown_frame(seen(times, place, 5e-4), rest_belongs=False)
+    first = thrown_frame(noisy(times, place, 5e-4), rest_belongs=False)
     assert first is not None
     # A hand's acceleration changes within so long, or within two frames and a half.
     assert abs(times[first] - 0.16) <= max(0.05, 2.5 / fps)
@@ -51,7 +49,7 @@ def test_no_frame_of_the_hand_is_left(noise_m: float) -> None:
     times, place = thrown(60.0, hand_s=0.16)
     place = np.concatenate([np.repeat(place[:, :1], 12, axis=1), place], axis=1)
     times = np.concatenate([np.arange(-12, 0) / 60, times])
-    first = thrown_frame(seen(times, place, noise_m), rest_belongs=False)
+    first = thrown_frame(noisy(times, place, noise_m), rest_belongs=False)
     assert first is not None and 22 <= first <= 24
 
 
@@ -59,7 +57,7 @@ def test_no_frame_of_the_hand_is_left(noise_m: float) -> None:
 @pytest.mark.parametrize("noise_m", [1e-5, 3e-3])
 def test_what_flies_from_the_first_frame_is_left_whole(drag_per_m: float, noise_m: float) -> None:
     times, place = thrown(60.0, hand_s=0.0, drag_per_m=drag_per_m)
-    assert thrown_frame(seen(times, place, noise_m), rest_belongs=False) is None
+    assert thrown_frame(noisy(times, place, noise_m), rest_belongs=False) is None
 
 
 def dropped(lowered_m_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -71,9 +69,9 @@ def dropped(lowered_m_s: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_drop_from_rest_has_no_hand_and_one_that_is_lowered_has() -> None:
-    assert thrown_frame(seen(*dropped(0.0), 5e-4), rest_belongs=True) is None
+    assert thrown_frame(noisy(*dropped(0.0), 5e-4), rest_belongs=True) is None
     times, place = dropped(0.4)
-    first = thrown_frame(seen(times, place, 5e-4), rest_belongs=True)
+    first = thrown_frame(noisy(times, place, 5e-4), rest_belongs=True)
     assert first is not None and abs(times[first] - 0.3) <= 0.05
     # What lies still before it is thrown is no flight.
-    assert thrown_frame(seen(*dropped(0.0), 5e-4), rest_belongs=False) is not None
+    assert thrown_frame(noisy(*dropped(0.0), 5e-4), rest_belongs=False) is not None

@@ -6,6 +6,7 @@ import pytest
 from galileo_jax.measurement.segments.handling import let_go_frame
 from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 NOISE_M, AMPLITUDE_M = 3e-4, 0.06
 
@@ -22,10 +23,7 @@ def swing(
     times = np.arange(0.0, 4.0, 1 / fps)
     after = np.minimum(np.clip(times - held_s, 0.0, None), stopped_s - held_s)
     y = AMPLITUDE_M * np.exp(-damping * after) * np.cos(2 * np.pi * after / period_s + phase)
-    place = np.stack([0.0 * y, y])
-    place = place + NOISE_M * np.random.default_rng(3).standard_normal(place.shape)
-    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(times)))
-    return Observation(("object1",), times, place[None], error, np.ones((1, len(times)), bool))
+    return seen(np.stack([0.0 * y, y]), times, NOISE_M, seed=3)
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])
@@ -42,9 +40,9 @@ def test_the_release_is_found_however_late(fps: float, held_s: float) -> None:
 def test_what_swings_from_the_first_frame_on_is_not_held(
     fps: float, phase: float, period_s: float
 ) -> None:
-    seen = swing(fps, phase=phase, period_s=period_s)
-    assert let_go_frame(seen) is None
-    assert standstill_frame(seen) is None
+    swings = swing(fps, phase=phase, period_s=period_s)
+    assert let_go_frame(swings) is None
+    assert standstill_frame(swings) is None
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])

@@ -5,19 +5,16 @@ import pytest
 
 from galileo_jax.measurement.segments.rest import placed_frames
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 NOISE_M, SLOPE = 3e-4, 0.4
 DOWN = np.array([np.cos(SLOPE), -np.sin(SLOPE)])
 CARRY, REST, SLIDE = 0.6, 0.7, 1.0  # s
 
 
-def seen(way_m: np.ndarray, fps: float, seed: int = 3) -> Observation:
+def down(way_m: np.ndarray, fps: float) -> Observation:
     """An object so far down a board, `[frame]`."""
-    place = way_m * DOWN[:, None]
-    place = place + NOISE_M * np.random.default_rng(seed).standard_normal(place.shape)
-    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(way_m)))
-    times = np.arange(len(way_m)) / fps
-    return Observation(("object1",), times, place[None], error, np.ones((1, len(way_m)), bool))
+    return seen(way_m * DOWN[:, None], np.arange(len(way_m)) / fps, NOISE_M, seed=3)
 
 
 def smooth(since: np.ndarray) -> np.ndarray:
@@ -34,7 +31,7 @@ def slid(since: np.ndarray, length_m: float = 0.6) -> np.ndarray:
 @pytest.mark.parametrize("from_m", [0.3, -0.3], ids=["from below", "from above"])
 def test_what_puts_it_into_place_is_no_part_of_the_run(fps, from_m):
     t = np.arange(0, CARRY + REST + SLIDE, 1 / fps)
-    first, last = placed_frames(seen(from_m * (1 - smooth(t)) + slid(t - CARRY - REST), fps))
+    first, last = placed_frames(down(from_m * (1 - smooth(t)) + slid(t - CARRY - REST), fps))
     assert last is None and first is not None
     assert CARRY < t[first] < CARRY + REST
 
@@ -43,17 +40,17 @@ def test_what_puts_it_into_place_is_no_part_of_the_run(fps, from_m):
 def test_nor_is_what_takes_it_away(fps):
     t = np.arange(0, REST + SLIDE + REST + CARRY, 1 / fps)
     way = slid(t - REST) - 0.5 * smooth(t - REST - SLIDE - REST)
-    first, last = placed_frames(seen(way, fps))
+    first, last = placed_frames(down(way, fps))
     assert first is None and last is not None
     assert REST + SLIDE < t[last] < 2 * REST + SLIDE
 
 
 def test_a_camera_that_runs_long_and_a_long_rest_at_the_end_are_no_hands():
     t = np.arange(0, 6.0, 1 / 60)
-    assert placed_frames(seen(slid(t - 3.0), 60.0)) == (None, None)
+    assert placed_frames(down(slid(t - 3.0), 60.0)) == (None, None)
 
 
 def test_what_turns_back_slowly_does_not_rest():
     """A disc in a valley stands still at either end, for an instant."""
     t = np.arange(0, 8.0, 1 / 120)
-    assert placed_frames(seen(0.4 * (1 - np.cos(1.2 * t)), 120.0)) == (None, None)
+    assert placed_frames(down(0.4 * (1 - np.cos(1.2 * t)), 120.0)) == (None, None)

@@ -11,18 +11,14 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.start_speed import start_speed
 from galileo_jax.observation.observation import Observation
+from tests.measurement.seen import seen
 
 FPS, NOISE_M, A_M_S2 = 60.0, 5e-4, 2.4
 DOWN = np.array([np.cos(0.4), -np.sin(0.4)])
 
 
 def went(way_m: np.ndarray, seed: int = 0) -> Observation:
-    count = len(way_m)
-    place = way_m * DOWN[:, None]
-    place = place + NOISE_M * np.random.default_rng(seed).standard_normal(place.shape)
-    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count))
-    times = np.arange(count) / FPS
-    return Observation(("object1",), times, place[None], error, np.ones((1, count), bool))
+    return seen(way_m * DOWN[:, None], np.arange(len(way_m)) / FPS, NOISE_M, seed)
 
 
 def way(release_s: float, drag_per_s: float = 0.0, count: int = 60) -> np.ndarray:

@@ -11,6 +11,7 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.wander_size import IN_SPACE_S, LARGEST_M, LASTS_S, with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.gaussian_likelihood import whitening_in
+from tests.measurement.seen import seen
 from tests.ramp_model import HIT, make_surroundings
 
 SD_M = 1e-5
@@ -31,9 +32,7 @@ def pucks(wander_m: float, seed: int, frames: int = 70, fps: float = 60.0) -> Ob
     root = np.linalg.cholesky(np.exp(-apart / LASTS_S) + 1e-12 * np.eye(frames))
     place += wander_m * (rng.standard_normal(place.shape) @ root.T)
     place += SD_M * rng.standard_normal(place.shape)
-    covariance = np.broadcast_to(SD_M**2 * np.eye(2)[None, :, :, None], (2, 2, 2, frames))
-    mask = np.ones((2, frames), bool)
-    return Observation(("one", "other"), times, place, covariance, mask)
+    return seen(place, times, SD_M)
 
 
 @pytest.mark.parametrize("wander_m", [3e-5, 2e-4])
@@ -67,15 +66,14 @@ def tossed(wander_m: float, seed: int, frames: int = 40) -> Observation:
     root = np.linalg.cholesky(np.exp(-apart / IN_SPACE_S) + 1e-12 * np.eye(frames))
     place = place + wander_m * (rng.standard_normal(place.shape) @ root.T)
     place += SD_M * rng.standard_normal(place.shape)
-    covariance = np.broadcast_to(SD_M**2 * np.eye(3)[None, :, :, None], (1, 3, 3, frames))
-    return Observation(("box",), times, place, covariance, np.ones((1, frames), bool))
+    return seen(place, times, SD_M)
 
 
 def test_a_toss_has_its_own_and_a_ball_in_space_that_of_all(tmp_path: Path) -> None:
     """Its poses scatter by 0.01 mm: a wander of 2 mm would hide how fast it falls."""
-    seen = tossed(0.0, 3)
+    box = tossed(0.0, 3)
     places = [
-        (t, x, z, y + 0.5) for t, x, y, z in zip(seen.times_s, *seen.position_m[0], strict=True)
+        (t, x, z, y + 0.5) for t, x, y, z in zip(box.times_s, *box.position_m[0], strict=True)
     ]
     poses = [",".join(f"{value:.7f}" for value in (*row, 1, 0, 0, 0)) for row in places]
     head = "time_s,x_m,y_m,z_m"
@@ -100,11 +98,11 @@ def test_a_toss_has_its_own_and_a_ball_in_space_that_of_all(tmp_path: Path) -> N
 @pytest.mark.parametrize("wander_m", [None, 1e-5])
 def test_in_space_the_likelihood_takes_what_the_track_tells(wander_m: float | None) -> None:
     """A fall that is 2 % slower than it should be is hidden by 2 mm of wander, and not by 0.01."""
-    seen = replace(tossed(0.0, 0), wander_m=wander_m)
+    fall = replace(tossed(0.0, 0), wander_m=wander_m)
     box = make_surroundings(replace(HIT, object2_x_m=None))
     scene = replace(box, has_table=False, has_surface=False, moves_in_plane=True)
-    data = whitening_in(seen, scene)
-    slow = np.zeros_like(seen.position_m)
-    slow[0, 1] = 0.1 * seen.times_s**2
+    data = whitening_in(fall, scene)
+    slow = np.zeros_like(fall.position_m)
+    slow[0, 1] = 0.1 * fall.times_s**2
     chi2 = float(np.sum(data.whiten_batch(slow, 1.0) ** 2))
     assert (chi2 > 100) == (wander_m is not None), chi2

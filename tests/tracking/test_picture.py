@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking.picture import MARGIN_PX, Picture
+from galileo_jax.tracking.picture import Picture
 
 SMOOTHED = 0.8
 """Grey levels of 60: rounded pixels, half pixels and linear interpolation against the exact
@@ -34,17 +34,6 @@ def test_places_between_pixels_have_the_smoothed_value(picture, pose, width):
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x, y = pose[0] + c * own[0] - s * own[1], pose[1] + s * own[0] + c * own[1]
     np.testing.assert_allclose(found, smoothed(x, y, width), atol=SMOOTHED)
-
-
-def test_a_part_has_the_values_of_the_whole(picture):
-    own = np.array([[-8.0, 0.0, 8.0], [3.0, 0.0, -8.0]], np.float32)
-    first, later = np.array([30.0, 30.0, 0.0]), np.array([30.0 + MARGIN_PX + 1, 33.5, 0.1])
-    part = picture.part(first, 12.0)
-    assert part.grey.size < picture.grey.size / 2
-    assert part.size_px == picture.size_px
-    for pose in (first, later):
-        expected = picture.at(pose, own, 12.0, 0.8)
-        np.testing.assert_allclose(part.at(pose, own, 12.0, 0.8), expected, atol=1e-3)
 
 
 def test_beyond_the_border_the_last_pixels_go_on():

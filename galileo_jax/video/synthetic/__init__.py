@@ -9,13 +9,4 @@ from galileo_jax.video.synthetic.filming import Camera, Filming, Hand
 from galileo_jax.video.synthetic.render import Motion, Ramp, render_clip, render_frames
 from galileo_jax.video.synthetic.textures import Body
 
-__all__ = [
-    "Body",
-    "Camera",
-    "Filming",
-    "Hand",
-    "Motion",
-    "Ramp",
-    "render_clip",
-    "render_frames",
-]
+__all__ = ["Body", "Camera", "Filming", "Hand", "Motion", "Ramp", "render_clip", "render_frames"]
