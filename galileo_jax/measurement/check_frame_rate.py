@@ -91,10 +91,8 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
         return _of_pendulum(clip.thread_m, times, x)
     if scenario.is_level or scenario.angle_deg == 0:
         along = np.hypot(*np.array([x - x[0], y - y[0]]))
-        slowing = _largest(accelerations(times, -along))
-        return (
-            None if slowing is None else ApparentGravity(slowing, is_least=True)
-        )  # friction is hardly more than 1
+        slowing = _largest(accelerations(times, -along))  # of friction of 1, hardly of more
+        return None if slowing is None else ApparentGravity(slowing, is_least=True)
     if not scenario.has_ramp or not clip.ramp_angle_deg:
         return None
     angle = math.radians(clip.ramp_angle_deg)

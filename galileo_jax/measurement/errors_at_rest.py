@@ -48,7 +48,6 @@ TAUS = np.array([1.0, 1.5, 2.5, 4.0, 7.0])  # frames
 # clips that were looked at, MPEG-4), 0.41 and 0.51 (10 in H.264), 0.06 and 0.34 (10 in H.265).
 SHIFT_SHARE = 0.4
 FAINT = 0.1  # of the independent errors: a weaker pattern of errors is left out
-
 Kinds = Float[np.ndarray, " kind"]
 """One for independent errors, then one for each share and, of it, each tau."""
 

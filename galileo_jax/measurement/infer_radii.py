@@ -25,7 +25,6 @@ HEIGHT_M = 0.01  # of a puck of which only the radius matters
 BESIDE = 5  # frames on either side of a hit through which lines are laid
 LEAST_TURN = 5.0  # standard deviations by which the distance's rate changes at a hit
 POINT_SHARE = 0.03  # of the distance: marked points are the centres no better
-
 Found = tuple[Clip, Observation, Mapping[str, Mapping[str, Any]], list[str]]
 
 

@@ -26,7 +26,7 @@ from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import SIZE_SD_M, infer_foot, infer_sizes, infer_slope
 from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
-from galileo_jax.measurement.segments.segments import HELD, Cut, Phase, Segments, cuts_of, segment
+from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, cuts_of, segment
 from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
 from galileo_jax.measurement.wander_size import with_wander
@@ -166,31 +166,19 @@ def measure(clip: Clip) -> Measurement:
         observation, said = with_rows_averaged(observation)
         told.say(*said)
     doubts = [] if way is None else [f"{clip.path}: {way_text(clip, way)}"]
+    overlay = f"see the overlay: galileo track {clip.source or clip.path}"
     doubts += [] if doubt is None else [doubt]
-    doubts += [
-        f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
-        for one in segments.astray
-    ]
+    doubts += [f"{clip.path}: {one}: {one.why}; {overlay}" for one in segments.astray]
+    of_scene = _of_scene(clip, whole, segments, pixels)
     return Measurement(
-        clip,
-        observation,
-        whole,
-        pixels,
-        told.inferred,
-        segments,
-        tuple(doubts),
-        tuple(told.remarks),
-        way,
-        frames_used,
-        frames=len(whole.times_s),
-        frames_of_scene=_of_scene(clip, whole, segments, pixels),
-    )
+        clip, observation, whole, pixels, told.inferred, segments, tuple(doubts),
+        tuple(told.remarks), way, frames_used, len(whole.times_s), of_scene,
+    )  # fmt: skip
 
 
 def _of_scene(clip: Clip, whole: Observation, segments: Segments, pixels: Track | None) -> int:
     """How many frames show what is modelled."""
-    phases = segments.phases(whole.names, whole.times_s)
-    is_there = ((phases == Phase.SCENE) | (phases == Phase.ASTRAY)).any(axis=0)
+    is_there = segments.within(whole.times_s)
     is_there[: min(item.first_frame or 0 for item in clip.objects)] = False
     if pixels is not None:
         is_there[_left_picture(pixels) :] = False

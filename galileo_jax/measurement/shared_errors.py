@@ -23,16 +23,6 @@ ARRAYS = ("modes_m", "turned_rad")  # which an observation may not have
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
-def save_shared_errors(folder: Path, observation: Observation) -> None:
-    """Writes those of a run, or removes those of an older one."""
-    write_errors(folder / ERRORS, observation)
-
-
-def with_shared_errors(folder: Path, observation: Observation) -> Observation:
-    """The observation with those of its run; as it is where there is no file."""
-    return with_errors(folder / ERRORS, observation)
-
-
 def beside(track: Path) -> Path:
     """Where the errors of a csv track stand."""
     return track.with_name(f"{track.stem}.{ERRORS}")

@@ -7,15 +7,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 NOMINAL_SCALE_PX_PER_M = 500.0
-
 UNMEASURED_SD_M = 10.0
 """Across the way of a motion of which one coordinate was measured: the error says nothing, and is
 still small enough for the other's to keep its digits in one covariance."""
-
 AWAY_SD, AWAY_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
 STANDING_FRAMES = 5  # that say where it stood
 LEAST_SD_M = 1e-6  # smaller errors do not keep their digits beside it
-
 Steps = Float[np.ndarray, " step"]
 
 

@@ -23,7 +23,7 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.measurement.shared_errors import save_shared_errors, with_shared_errors
+from galileo_jax.measurement.shared_errors import ERRORS, with_errors, write_errors
 from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
@@ -83,7 +83,7 @@ def save_run(
             keys[key] = str(Path(file).resolve())
     write_text(folder / CLIP, yaml.safe_dump(keys, sort_keys=False))
     write_observation_csv(folder / OBSERVATION, observation)
-    save_shared_errors(folder, observation)
+    write_errors(folder / ERRORS, observation)
     posterior.to_netcdf(folder / POSTERIOR)
     write_json(folder / RESULT, result)
 
@@ -107,7 +107,7 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     folder = Path(folder)
     result = read_result(folder)
     clip = load_clip(folder / CLIP)
-    observation = with_shared_errors(folder, read_observation_csv(folder / OBSERVATION))
+    observation = with_errors(folder / ERRORS, read_observation_csv(folder / OBSERVATION))
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
     for path in result.get("effects_from", []):
         load_file(path)

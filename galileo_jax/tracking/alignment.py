@@ -27,8 +27,6 @@ HUBER, REJECT = 2.0, 5.0
 FINE_PX, COARSE_PX = 0.8, 3.0
 """Widths of the Gaussian smoothing of image and template. Fine: keeps the interpolation
 error small; coarse: reaches 5 px and 10 degrees."""
-
-
 TURNLESS = 0.02
 """An object whose gradients tell the angle less than this share of what they could looks the same
 however it is turned: its angle is not followed."""

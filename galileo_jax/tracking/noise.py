@@ -52,6 +52,27 @@ def has_moved(place: np.ndarray, noise: np.ndarray) -> np.ndarray:
     return np.diff(place, axis=0) ** 2 > MOVED_SDS**2 * (variance[1:] + variance[:-1])
 
 
+def covariance_in_motion(
+    place: np.ndarray, noise: np.ndarray, excess: np.ndarray, clock: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`[frame, 2, 2]`, px^2: what is to be stated of a track, and where it moves, `[seen, 2]`.
+
+    Args:
+      place: `[frame, 2]`, px; NaN where not visible.
+      noise: `[frame, 2, 2]`, px^2, of the image alone.
+      excess: `[2]`, px^2, of what moves in this video, slowly: see `motion_variance`.
+      clock: `[frame]`, when each was taken, in usual steps.
+    """
+    covariance, frames = noise.copy(), np.flatnonzero(np.isfinite(place[:, 0]))
+    seen = place[frames], noise[frames]
+    moves = is_in_motion(*seen)
+    covariance[frames] += (moves * excess * speed_scale2(seen[0])[:, None])[..., None] * np.eye(2)
+    scale2 = motion_scale2(place, covariance, clock) * after_blow_scale2(*seen) * slow_scale2(*seen)
+    scale = np.sqrt(np.where(moves, scale2, 1.0))
+    covariance[frames] *= scale[:, :, None] * scale[:, None, :]
+    return covariance, moves
+
+
 def is_in_motion(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """`[frame, 2]`, per image axis: whether what is tracked moves there, or did just before.
 

@@ -14,13 +14,9 @@ from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
     SAMPLING_SD_PX,
-    after_blow_scale2,
     blow_shift,
-    is_in_motion,
-    motion_scale2,
+    covariance_in_motion,
     motion_variance,
-    slow_scale2,
-    speed_scale2,
 )
 from galileo_jax.tracking.pose import length, rotation
 from galileo_jax.tracking.refiner import Refined
@@ -29,11 +25,8 @@ MIN_CORRELATION = 0.7
 MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
 """An object is visible if its patch correlates with the template, no more of it than these
 shares differs from the template by more than noise, or lies beyond the picture's border."""
-
 LONG_RUN = 10  # of frames is believed after any gap
 SAME_PLACE_PX = 1.0  # what comes back this close to where it was had only been covered
-
-
 LONG_GAP, PATH_FRAMES = 4.0, 8
 """After so many usual steps out of sight the path of so many frames before has to lead to where an
 object is seen again."""
@@ -141,16 +134,8 @@ def _anchored(
     Where it began is the mean of the frames before it moves, so that the noise of its first
     frame is not in every point.
     """
-    covariance = noise.copy()
+    covariance, moves = covariance_in_motion(poses[:, :2], noise, excess, clock)
     frames = np.flatnonzero(np.isfinite(poses[:, 0]))
-    known = poses[frames, :2], noise[frames]
-    moves = is_in_motion(*known)
-    covariance[frames] += (moves * excess * speed_scale2(known[0])[:, None])[..., None] * np.eye(2)
-    scale2 = motion_scale2(poses[:, :2], covariance, clock)
-    scale2 = scale2 * after_blow_scale2(*known) * slow_scale2(*known)
-    scale = np.sqrt(np.where(moves, scale2, 1.0))
-    covariance[frames] *= scale[:, :, None] * scale[:, None, :]
-
     first_frame, point_px = piece.first_frame, np.array(piece.point_px)
     first_fit = fits[first_frame] if first_frame < len(fits) else None
     anchor = np.array([*point_px, 0.0])

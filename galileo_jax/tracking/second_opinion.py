@@ -96,7 +96,7 @@ def with_silhouette(
         kept[last + 1 :] = False
         if kept.any():
             slow_px = float(np.hypot(slow_px, ON_OBJECT * size))
-    covariance = _covariance(place, clock)
+    covariance = np.where(kept[:, None, None], found.covariance_px2, _covariance(place, clock))
     if start.outline.is_round or not is_fixed:
         place = np.where(kept[:, None], found.position_px - middle, place)
     else:
@@ -105,14 +105,8 @@ def with_silhouette(
     nothing = np.where(used, 0.0, np.nan)
     shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
     shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
-    covariance = np.where(kept[:, None, None], found.covariance_px2, covariance)
-    return Finished(
-        position_px=place,
-        covariance_px2=covariance + nothing[:, None, None],
-        common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
-        shifts_px=shifts_px,
-        angle_rad=nothing,
-    )
+    none = np.tile(nothing[:, None, None], (1, 2, 2))
+    return Finished(place, covariance + none, none, shifts_px, nothing)
 
 
 def _led_on(
@@ -164,11 +158,8 @@ def _is_own(
         return bool(np.median(off / path.sizes_px[both]) < INSIDE)
     known = np.flatnonzero(seen)
     nearest = int(known[np.argmin(np.abs(known - frames[0]))])
-    off_px, is_next = (
-        length(place[0] - position_px[nearest]),
-        abs(frames[0] - nearest) <= MOST_MISSED,
-    )
-    return bool(is_next and off_px < BESIDE * path.sizes_px[0])
+    is_beside = length(place[0] - position_px[nearest]) < BESIDE * path.sizes_px[0]
+    return bool(is_beside and abs(frames[0] - nearest) <= MOST_MISSED)
 
 
 def _turns(found: Finished, start: Start) -> bool:

@@ -18,7 +18,6 @@ from galileo_jax.tracking.track import Track
 
 LARGEST = 2.0  # of the picture's own size: far parts of an oblique plane would fill a wall
 OUTSIDE = -1e4  # a pixel that is in no picture
-
 Place = tuple[float, float]
 
 

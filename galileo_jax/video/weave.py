@@ -19,11 +19,8 @@ from jaxtyping import Float, UInt8
 WOVEN = 0.9  # R of what is woven is smaller
 MOVED_GREY = 12  # pixels that change by less may be noise
 LEAST_PIXELS = 200  # that moved, in the whole film; fewer tell nothing
-
 BLUR = 8  # of the picture's sides, over which fields are blurred before they are compared
-
 COLUMNS = 4  # of which one is enough to tell which field is first
-
 Rows = Float[np.ndarray, "sum"]
 NO_ROWS: Rows = np.zeros(5)
 

@@ -18,19 +18,15 @@ FOOT = 1.2  # half lengths from the foot, within which it may lie across it
 STREAK = 3  # frames on end in which it stands
 FEWEST_FRAMES = 4  # in which a height is told
 TIPS = ("box", "cylinder")
-
 CLOSER_M = 2e-3  # what a hit's distance is known to
 BEGINS_M = 5e-4
 FOLD_FRAMES = 3
-
 MARGIN_M = 3e-3  # what a point is off the centre
 BEYOND_M = 5e-3
 SURE = 5.0  # standard deviations that it has come back at least
-
 TIPS_OVER = "tips over onto another face"
 FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
 RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
-
 Half = tuple[float, float]  # of an object's length along the travel and of its height, m
 
 

@@ -20,11 +20,10 @@ what is no more the object that was marked is `Astray`.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool
 
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -51,7 +50,6 @@ TAKEN = "is taken away by a hand from then on"
 IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
 PUSHED = "is pushed by a hand before that: it gains speed on a level table"
-
 SWINGS = ("pendulum", "spring", "liquid")
 EXPOSED_FRAMES = 1
 """Of a video: the hit falls into an exposure, whose frame shows neither before nor after."""
@@ -78,15 +76,6 @@ class Cut:
         return f"{self.name} {self.why}; everything {self.side} {self.time_s:.3f} s is left out"
 
 
-class Phase(IntEnum):
-    """What an object does in a frame."""
-
-    BEFORE = 0  # it is in a hand, or not let go yet
-    SCENE = 1  # it moves, or rests, as the scene has it
-    AFTER = 2  # something that is not of the scene has ended its motion
-    ASTRAY = 3  # what is tracked is not, or may not be, the object
-
-
 @dataclass(frozen=True)
 class Segments:
     """Where a track is motion of its scene.
@@ -99,17 +88,11 @@ class Segments:
     cuts: tuple[Cut, ...] = ()
     astray: tuple[Astray, ...] = ()
 
-    def phases(self, names: Sequence[str], times_s: np.ndarray) -> Int[np.ndarray, "object frame"]:
-        """The `Phase` of each object in each frame."""
-        found = np.full((len(names), len(times_s)), Phase.SCENE)
-        for one in self.astray:
-            if one.is_left_out:
-                found[names.index(one.name), times_s >= one.time_s] = Phase.ASTRAY
+    def within(self, times_s: np.ndarray) -> Bool[np.ndarray, " frame"]:
+        """Which frames no cut leaves out."""
+        found = np.ones(len(times_s), bool)
         for cut in self.cuts:
-            if cut.side == "before":
-                found[:, times_s < cut.time_s] = Phase.BEFORE
-            else:
-                found[:, times_s > cut.time_s] = Phase.AFTER
+            found &= times_s >= cut.time_s if cut.side == "before" else times_s <= cut.time_s
         return found
 
     def used(self, observation: Observation) -> Observation:
@@ -118,11 +101,13 @@ class Segments:
         Frames at its end in which nothing is seen any more cost only time, and are gone; those
         before it stay: frames are counted from the clip's beginning.
         """
-        phases = self.phases(observation.names, observation.times_s)
-        used = replace(observation, mask=observation.mask & (phases == Phase.SCENE))
+        seen = observation.mask & self.within(observation.times_s)
+        used = replace(observation, mask=seen.copy())
+        for one in self.astray:
+            if one.is_left_out:
+                used.mask[observation.names.index(one.name), used.times_s >= one.time_s] = False
         if not any(cut.side == "after" for cut in self.cuts):
             return used
-        seen = observation.mask & (phases != Phase.BEFORE) & (phases != Phase.AFTER)
         return used.between(slice(int(np.flatnonzero(seen.any(axis=0))[-1]) + 1))
 
 
