@@ -20,6 +20,16 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from galileo_jax.neural.fitted_lines import (
+    Decay,
+    Estimate,
+    Line,
+    at_end,
+    combined,
+    decay,
+    parabola,
+    straight,
+)
 from galileo_jax.neural.seen import Seen
 from galileo_jax.observation.observation import AWAY_M, AWAY_SD
 
@@ -30,41 +40,6 @@ CAMERA_SD_M_S2 = 0.01
 CAMERA_RATIO_SD = 0.02
 FOOT_SD, REBOUND, REBOUND_SD = 0.05, 0.012, 0.02
 NEVER = 10.0  # m/s, the standard deviation of a speed that nothing tells
-
-
-class Estimate(NamedTuple):
-    """A number `[]` and its standard deviation."""
-
-    value: jax.Array
-    sd: jax.Array
-
-
-class Line(NamedTuple):
-    """A fitted parabola `value + slope (t - at) + curve (t - at)^2 / 2`."""
-
-    value: jax.Array
-    slope: jax.Array
-    curve: jax.Array
-    at_s: jax.Array
-    curve_sd: jax.Array
-    slope_sd: jax.Array
-
-    def __call__(self, time_s: jax.Array) -> jax.Array:
-        """The parabola at a time."""
-        t = time_s - self.at_s
-        return self.value + self.slope * t + self.curve * t**2 / 2
-
-    def speed(self, time_s: jax.Array) -> jax.Array:
-        """Its slope at a time."""
-        return self.slope + self.curve * (time_s - self.at_s)
-
-
-class Decay(NamedTuple):
-    """A motion that comes to rest: `end - rate (stop - t)^2 / 2`, from the line of its root."""
-
-    rate: jax.Array
-    stop_s: jax.Array
-    rate_sd: jax.Array
 
 
 class Setting(NamedTuple):
@@ -183,60 +158,6 @@ def fit_phases(seen: Seen) -> Phases:
     return Phases(setting, onset, ramp, table, friction1, after, hit, ratio, pushes, friction2)
 
 
-def parabola(t: jax.Array, y: jax.Array, mask: jax.Array, noise: jax.Array) -> Line:
-    """Least squares through the masked frames; wide errors where they are too few."""
-    weight = mask.astype(y.dtype)
-    count = weight.sum()
-    at = (weight * t).sum() / jnp.maximum(count, 1)
-    span = jnp.sqrt((weight * (t - at) ** 2).sum() / jnp.maximum(count, 1)) + 1e-6
-    u = (t - at) / span
-    design = jnp.stack([jnp.ones_like(u), u, u**2 / 2])
-    ridge = 1e-9 * jnp.eye(3)
-    covariance = jnp.linalg.inv((design * weight) @ design.T + ridge)
-    base = (weight * y).sum() / jnp.maximum(count, 1)
-    c = covariance @ (design @ (weight * (y - base)))
-    sd = noise * jnp.sqrt(jnp.diagonal(covariance))
-    return Line(c[0] + base, c[1] / span, c[2] / span**2, at, sd[2] / span**2, sd[1] / span)
-
-
-def decay(t: jax.Array, left: jax.Array, mask: jax.Array, noise: jax.Array) -> Decay:
-    """Fits `sqrt(2 left) = sqrt(rate) (stop - t)`, weighted for equal errors of `left`."""
-    root = jnp.sqrt(2 * jnp.maximum(left, 1e-9))
-    at, mean, slope, per_noise = _straight(t, root, jnp.where(mask, root**2, 0.0), 1e-12)
-    slope = jnp.minimum(slope, -1e-3)
-    return Decay(slope**2, at - mean / slope, 2 * jnp.abs(slope) * noise * per_noise)
-
-
-def _straight(
-    t: jax.Array, y: jax.Array, weight: jax.Array, least: float
-) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """The weighted straight line: its middle (t, y), its slope, and the slope's sd per noise."""
-    total = jnp.maximum(weight.sum(), least)
-    at, mean = (weight * t).sum() / total, (weight * y).sum() / total
-    spread = jnp.maximum((weight * (t - at) ** 2).sum(), least)
-    slope = (weight * (t - at) * (y - mean)).sum() / spread
-    return at, mean, slope, 1 / jnp.sqrt(spread)
-
-
-def _combine(one: Estimate, other: Estimate) -> Estimate:
-    """The mean by inverse variance."""
-    weight, against = 1 / one.sd**2, 1 / other.sd**2
-    total = weight + against
-    return Estimate((weight * one.value + against * other.value) / total, 1 / jnp.sqrt(total))
-
-
-def _at_end(x: jax.Array, mask: jax.Array, noise: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """The mean place of the last frames that stay in one, and how many they are."""
-    last = x.shape[0] - 1 - jnp.argmax(mask[::-1])
-    near = mask & (jnp.abs(x - x[last]) < jnp.maximum(4 * noise, 5e-5))
-    # Only an unbroken rest counts: the same place on the way is no rest.
-    frames = jnp.arange(x.shape[0])
-    away = jnp.where(mask & ~near, frames, -1).max()
-    near = near & (frames > away)
-    count = near.sum()
-    return jnp.where(near, x, 0.0).sum() / jnp.maximum(count, 1), count
-
-
 def _setting(seen: Seen) -> Setting:
     sin, cos = jnp.sin(seen.angle_rad), jnp.cos(seen.angle_rad)
     x1, y1 = seen.position_m[0]
@@ -299,7 +220,7 @@ def _ramp(seen: Seen, setting: Setting, onset: Onset) -> Ramp:
 def _table(seen: Seen, setting: Setting, onset: Onset) -> Table:
     x, mask, noise = seen.position_m[0, 0], seen.mask[0], seen.noise_m[0]
     is_there = mask & (x > setting.corner_m[0] + setting.margin_m) & onset.before
-    end, rest = _at_end(x, mask, noise)
+    end, rest = at_end(x, mask, noise)
     sliding = is_there & (onset.is_hit | (end - x > setting.moved_m[0]) | (rest < 3))
     path = parabola(seen.times_s, x, sliding, noise)
     sd = jnp.hypot(path.curve_sd, seen.is_filmed * 2 * CAMERA_SD_M_S2) / seen.gravity
@@ -337,7 +258,7 @@ def _slide(seen: Seen, setting: Setting, onset: Onset, i: int, gone: jax.Array) 
     """Object i's; `gone`: `[frame]`, where it may slide."""
     t, x, noise = seen.times_s, seen.position_m[i, 0], seen.noise_m[i]
     is_there = seen.mask[i] & (setting.frame >= onset.frame)
-    end, rest = _at_end(x, seen.mask[i], noise)
+    end, rest = at_end(x, seen.mask[i], noise)
     slides = is_there & (end - x > setting.moved_m[i]) & gone
     return Slide(
         is_there=is_there,
@@ -363,7 +284,7 @@ def _hit(
     reach = onset.place2_m - seen.half_length_m.sum()
     from_table = _speed_on_table(seen, time, table, friction1)
     from_ramp = _speed_from_ramp(seen, setting, ramp, friction1, reach)
-    before1 = _combine(from_table, from_ramp)
+    before1 = combined(from_table, from_ramp)
     own1 = _own_speed_after(setting, time, after)
     after2 = _speed2_after(seen, time, after)
     # A hit is nearly plastic, so that both leave it at almost one speed.
@@ -371,7 +292,7 @@ def _hit(
     as_one = Estimate(
         after2.value - rebound * before1.value, rebound_sd * before1.value + after2.sd
     )
-    after1 = _combine(own1, as_one)
+    after1 = combined(own1, as_one)
     return Hit(time, latest, reach, from_table, from_ramp, before1, own1, after1, after2)
 
 
@@ -431,7 +352,7 @@ def _speed_on_table(seen: Seen, time: jax.Array, table: Table, friction1: Estima
     t, g, sliding = seen.times_s, seen.gravity, table.is_sliding
     lift = friction1.value * g * (t - time) ** 2 / 2
     flat = seen.position_m[0, 0] + lift
-    at, _, speed, per_noise = _straight(t, flat, sliding.astype(t.dtype), 1e-9)
+    at, _, speed, per_noise = straight(t, flat, sliding.astype(t.dtype), 1e-9)
     sd = seen.noise_m[0] * per_noise + friction1.sd * g * jnp.abs(at - time)
     return Estimate(speed, jnp.where(sliding.sum() >= 2, sd, NEVER))
 

@@ -44,7 +44,7 @@ class Quadratic(NamedTuple):
 class ClipArrays(NamedTuple):
     """What compiled code needs of a clip, in shapes that many clips share."""
 
-    times_s: np.ndarray  # `[frame]`
+    times_s: Any  # `[frame]`
     whitening: Whitening  # with masked frames and idle modes added
     scene: Surroundings  # what it shows
     priors: PriorTable  # of its parameters
@@ -66,7 +66,7 @@ def white_of(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
     return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
 
 
-def _difference_m(kind: Kind, theta, position, velocity, clip: ClipArrays):
+def _difference_m(kind: Kind, theta, position, velocity, clip: ClipArrays) -> Any:
     """Observed minus predicted, `[object, axis, frame]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
