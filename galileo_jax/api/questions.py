@@ -195,8 +195,7 @@ def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
     fps = answers.get("fps") or known.declared.get("fps")
     if table is None or scenario is None or scenario.up_shows != "bend":
         return None
-    frame_s = 1 / fps if fps else table.frame_s
-    seconds = table.motion(1).clock * (1.0 if table.times_s is not None else frame_s or math.nan)
+    seconds = table.motion(1).seconds(fps)
     if not np.isfinite(seconds).all():
         return None
     place = table.motion(1).position[0]

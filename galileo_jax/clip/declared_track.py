@@ -84,7 +84,7 @@ def _joined(paths: Sequence[Path], tables: Sequence[TrackTable]) -> TrackTable:
     clock = "clocks (times in one, frames in the other)"
     for path, table in zip(paths[1:], tables[1:], strict=True):
         same = {"axes": table.axes == first.axes, "units of length": table.unit == first.unit,
-                clock: (table.times_s is None) == (first.times_s is None)}  # fmt: skip
+                clock: table.is_in_frames == first.is_in_frames}  # fmt: skip
         for what in (what for what, is_same in same.items() if not is_same):
             raise InputError(
                 f"{path}: other {what} than {paths[0].name}; the same expected in all files of "
@@ -118,8 +118,7 @@ def _joined(paths: Sequence[Path], tables: Sequence[TrackTable]) -> TrackTable:
         first,
         names=tuple(names),
         position=np.concatenate(places),
-        times_s=None if first.times_s is None else common,
-        frames=None if first.times_s is not None else np.rint(common),
+        clock=np.rint(common) if first.is_in_frames else common,
         resolution=tuple(max(each) for each in zip(*(t.resolution for t in tables), strict=True)),
         warnings=tuple(line for table in tables for line in table.warnings),
     )

@@ -87,14 +87,11 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
     if (count := len(table.starts)) > 1:
         warnings += (f"{path}: {count} motions, of which the first is looked at",)
         table = table.motion(1)
-    is_in_frames = table.times_s is None
     steps = np.diff(table.clock)
     step = float(np.median(steps)) if steps.size else math.nan
     place = table.position[0]
     shown = np.isfinite(place).all(axis=0)
-    frame_s = (1 / fps if fps else table.frame_s) if is_in_frames else 1.0
-    seconds = table.clock[shown] * (frame_s or math.nan)
-    likely = _likely(table, seconds, place[:, shown])
+    likely = _likely(table, table.seconds(fps)[shown], place[:, shown])
     return Seen(
         **vars(likely),
         path=path,
@@ -102,7 +99,7 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
         names=table.names,
         num_rows=table.position.shape[-1],
         step=step,
-        is_in_frames=is_in_frames,
+        is_in_frames=table.is_in_frames,
         gaps=tuple((int(n), float(steps[n] / step)) for n in np.flatnonzero(steps > GAP * step)),
         unit=table.unit,
         axes=table.axes,
@@ -225,7 +222,7 @@ def proposed_yaml(
     lines = [f"track: {path.name}", f"scenario: {scenario}"]
     if motions > 1:
         lines.append(f"trial: 1  # of {motions}: one clip for each")
-    if table.times_s is None:
+    if table.is_in_frames:
         lines.append(f"fps: {fps:g}" if fps else "# fps: of the camera, frames per second")
     if table.unit is None:
         lines.append("# track_units: m | cm | mm | km | in | ft | px; the file does not say")

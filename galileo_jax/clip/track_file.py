@@ -177,7 +177,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     return FileTrack(
         observation,
         unit,
-        fps=_frame_rate(times) if table.frames is None else 1 / _frame_s(of, table),
+        fps=1 / table.frame_s_by(of.fps) if table.is_in_frames else _frame_rate(times),
         pixels_per_metre=scale,
         origin_px=origin,
         warnings=table.warnings + warnings + lost + said + _doubts(of, table),
@@ -203,25 +203,17 @@ def _is_ours(path: Path) -> bool:
 
 def _times(of: DeclaredTrack, table: TrackTable) -> np.ndarray:
     """`[row]`, s."""
-    if table.times_s is not None:
-        return table.times_s
-    if of.fps is None and table.frame_s is None:
+    if table.is_in_frames and of.fps is None and table.frame_s is None:
         has = "has no times" if table.is_counted else "counts frames"
         raise of.wrong_key(
             f"fps: missing; {of.path.name} {has}; write fps: and the camera's true "
             "frame rate, such as fps: 30.0"
         )
-    return table.clock * _frame_s(of, table)
-
-
-def _frame_s(of: DeclaredTrack, table: TrackTable) -> float:
-    frame_s = 1 / of.fps if of.fps else table.frame_s
-    assert frame_s is not None  # `_times` has asked for it
-    return frame_s
+    return table.seconds(of.fps)
 
 
 def _doubts(of: DeclaredTrack, table: TrackTable) -> tuple[str, ...]:
-    if table.frames is None or of.fps is None or table.frame_s is None:
+    if not table.is_in_frames or of.fps is None or table.frame_s is None:
         return ()
     if abs(of.fps * table.frame_s - 1) <= 0.01:
         return ()

@@ -28,13 +28,11 @@ def track_chart(observation: Observation, name: str) -> Chart:
 
 def look_chart(seen: Seen, table: TrackTable) -> Chart:
     """Every object's places along each axis, in the table's own units, axis below axis."""
-    clock = table.frames if table.times_s is None else table.times_s
-    assert clock is not None  # a table has one of the two
     panels = []
     for i, axis in enumerate(table.axes):
         marks = _places(table.names, clock, [np.asarray(one[i]) for one in table.position])
         title = seen.path.name if i == 0 else ""
-        xlabel = "frame" if table.times_s is None else "time, s"
+        xlabel = "frame" if table.is_in_frames else "time, s"
         panels.append(Panel(f"{axis}, {seen.unit or 'no unit'}", marks, title, xlabel))
     return stacked("look", f"places in {seen.path.name}", panels)
 
@@ -47,6 +45,6 @@ def _places(
 ) -> tuple[Points, ...]:
     """All objects' places along one axis, `[object, frame]`."""
     return tuple(
-        Points(clock, places[i], object_colour(i), name, sd=None if sd is None else sd[i])
+        Points(table.clock, places[i], object_colour(i), name, sd=None if sd is None else sd[i])
         for i, name in enumerate(names)
     )

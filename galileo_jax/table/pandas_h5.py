@@ -46,7 +46,7 @@ def read_h5(path: Path) -> TrackTable:
     return TrackTable(
         names=tuple(" ".join(name) for name in parts),
         position=np.array(position),
-        frames=frames,
+        clock=frames,
         unit="px",
         y_axis="down",
     )

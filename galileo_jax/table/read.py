@@ -60,46 +60,40 @@ def read_table(path: Path, fps: float | None = None) -> TrackTable:
 
 def _table(columns: Columns) -> TrackTable:
     lines = [line for line, _ in columns.heading.body]
-    times, frames, resolution_s = _clock(columns, lines)
+    clock, resolution_s = _clock(columns, lines)
+    is_in_frames = not columns.of("time")
     names, axes, places, resolution = _places(columns)
     unit = _unit(columns)
     warnings, ids = list(columns.warnings), columns.of("object")
-    clock = frames if times is None else times
-    if clock is not None and not ids:
-        new, said = not_pasted(clock, places, lines)
-        times, frames = (None if one is None else one[new] for one in (times, frames))
-        places, lines = places[..., new], [lines[row] for row in new]
-        warnings += said
     if ids:
         if clock is None:
             raise InputError("a column of particles needs one of frames or times beside it")
         names, places, clock = _by_object(columns, ids[0], clock, places[0])
-        times, frames = (clock, None) if times is not None else (None, clock)
-    elif times is not None:
-        if times.size > 1 and (np.diff(times) < 0).all():
-            times, places, lines = times[::-1] - times[-1], places[..., ::-1], lines[::-1]
-            warnings.append("the last row comes first: read from the end")
-        times, even = unrounded(times, places, resolution_s)
-        times, places, said = without_repeats(times, places, lines)
-        warnings += [*even, *said]
-    elif frames is not None:
-        frames, places, said = without_repeats(frames, places, lines)
+    elif clock is not None:
+        new, said = not_pasted(clock, places, lines)
+        clock, places, lines = clock[new], places[..., new], [lines[row] for row in new]
+        warnings += said
+        if not is_in_frames:
+            if clock.size > 1 and (np.diff(clock) < 0).all():
+                clock, places, lines = clock[::-1] - clock[-1], places[..., ::-1], lines[::-1]
+                warnings.append("the last row comes first: read from the end")
+            clock, said = unrounded(clock, places, resolution_s)
+            warnings += said
+        clock, places, said = without_repeats(clock, places, lines)
         warnings += said
     is_seen_by_program = bool(columns.of("likelihood"))
     unit = unit or ("px" if is_seen_by_program else None)
-    is_counted = times is None and frames is None
-    frames = np.arange(places.shape[-1], dtype=float) if is_counted else frames
-    clock = frames if times is None else times
-    assert clock is not None  # frames, where there are no times
+    is_counted = clock is None
+    clock = np.arange(places.shape[-1], dtype=float) if clock is None else clock
     if not ids:
         places, said = without_copies(clock, places, resolution, lines)
         warnings += said
     return TrackTable(
         names=names,
         position=places,
+        clock=clock,
+        is_in_frames=is_in_frames,
         axes=axes,
-        times_s=times,
-        frames=frames,
         is_counted=is_counted,
         frame_s=columns.heading.frame_s,
         unit=unit,
@@ -123,19 +117,17 @@ def _listed(columns: Columns) -> tuple[Column, ...]:
     return tuple(found)
 
 
-def _clock(
-    columns: Columns, lines: Sequence[int]
-) -> tuple[np.ndarray | None, np.ndarray | None, float]:
-    """(times in s, None, their resolution) or (None, frames, 0), `[row]`; neither: both None."""
+def _clock(columns: Columns, lines: Sequence[int]) -> tuple[np.ndarray | None, float]:
+    """Times `[row]`, s, and their resolution, or else frames and 0; None of neither."""
     role = "time" if columns.of("time") else "frame"
     if not (found := columns.of(role)):
-        return None, None, 0.0
+        return None, 0.0
     values, title = columns.numbers[found[0]].values, columns.name_of(found[0])
     if np.isnan(values).any():
         at = int(np.isnan(values).argmax())
         raise InputError(f"line {lines[at]}: {title}: empty; a {role} in every row expected")
     if role == "frame":
-        return None, values, 0.0
+        return values, 0.0
     written = columns.meanings[found[0]].unit
     if written is not None and written not in SECONDS:
         raise InputError(f"{title}: a time in {written}; s, ms or us expected")
@@ -144,7 +136,7 @@ def _clock(
         per_unit = 1e-3
     if abs(values[0]) * per_unit > 1e6:  # a date: what is left of its digits begins at 0
         values = values - values[0]
-    return values * per_unit, None, columns.numbers[found[0]].resolution * per_unit
+    return values * per_unit, columns.numbers[found[0]].resolution * per_unit
 
 
 def _places(

@@ -65,9 +65,9 @@ class TrackTable:
       names: of the objects, as the file calls them.
       position: `[object, axis, row]` in `unit`, x right; NaN where an object was not seen.
       axes: what was measured, of "x", "y", "z", "line" (along the way) and "angle" (rad).
-      times_s: `[row]`, s; None where the file counts `frames`.
-      frames: `[row]`, whole numbers; None where it gives times.
-      is_counted: the file has neither times nor frames: each row is a frame.
+      clock: `[row]`, s, or whole numbers of frames.
+      is_in_frames: the file gives frames, not times.
+      is_counted: the file has neither: each row is a frame.
       frame_s: between two frames, s; None where the file does not tell.
       unit: a key of `METRES_PER_UNIT`, or "px"; None where the file does not tell.
       resolution: `[axis]`, unit in the last place of positions as printed, in `unit`; empty where
@@ -81,9 +81,9 @@ class TrackTable:
 
     names: tuple[str, ...]
     position: np.ndarray
+    clock: np.ndarray
+    is_in_frames: bool = True
     axes: tuple[str, ...] = ("x", "y")
-    times_s: np.ndarray | None = None
-    frames: np.ndarray | None = None
     is_counted: bool = False
     frame_s: float | None = None
     unit: str | None = None
@@ -94,21 +94,17 @@ class TrackTable:
     columns: tuple[Column, ...] = ()
     warnings: tuple[str, ...] = ()
 
-    @property
-    def clock(self) -> np.ndarray:
-        """`[row]`: times in s, or frames where it has no times."""
-        found = self.frames if self.times_s is None else self.times_s
-        assert found is not None  # a reader gives one of the two
-        return found
+    def frame_s_by(self, fps: float | None) -> float:
+        """Between two frames, s: as declared, or as the file tells; NaN where neither does."""
+        return 1 / fps if fps else self.frame_s or math.nan
+
+    def seconds(self, fps: float | None) -> np.ndarray:
+        """`[row]`, s; NaN where nobody tells how long a frame is."""
+        return self.clock * (self.frame_s_by(fps) if self.is_in_frames else 1.0)
 
     def motion(self, number: int) -> "TrackTable":
         """One of its motions, counted from 1."""
         ends = (*self.starts[1:], self.position.shape[-1])
         rows = slice(self.starts[number - 1], ends[number - 1])
-        return replace(
-            self,
-            position=self.position[..., rows],
-            times_s=None if self.times_s is None else self.times_s[rows],
-            frames=None if self.frames is None else self.frames[rows],
-            starts=(0,),
-        )
+        position, clock = self.position[..., rows], self.clock[rows]
+        return replace(self, position=position, clock=clock, starts=(0,))

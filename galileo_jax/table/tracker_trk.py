@@ -58,7 +58,7 @@ def read_trk(content: bytes) -> TrackTable:
     return TrackTable(
         names=tuple(marks),
         position=position,
-        frames=frames,
+        clock=frames,
         frame_s=_frame_s(panel),
         unit="px",
         y_axis="down",

@@ -45,8 +45,8 @@ def read(folder: Path, content: str | bytes, suffix: str = "csv", fps: float | N
 
 def check(table: TrackTable, index: int = 0) -> None:
     t, x, y = truth()
-    assert table.times_s is not None
-    np.testing.assert_allclose(table.times_s - table.times_s[0], t, atol=1e-9)
+    assert not table.is_in_frames
+    np.testing.assert_allclose(table.clock - table.clock[0], t, atol=1e-9)
     np.testing.assert_allclose(table.position[index], [x, y], atol=1e-12)
 
 
@@ -173,7 +173,7 @@ def test_a_row_for_each_particle(tmp_path: Path) -> None:
                 rows.append(f"{len(rows) - 1},{y},{x + particle},4126.1,{n},{particle}")
     table = read(tmp_path, "\n".join(rows))
     assert table.names == ("0", "7")
-    np.testing.assert_array_equal(table.frames, np.arange(ROWS))
+    np.testing.assert_array_equal(table.clock, np.arange(ROWS))
     np.testing.assert_allclose(table.position[0], truth()[1:])
     assert np.isnan(table.position[1, :, 3]).all()
     np.testing.assert_allclose(np.delete(table.position[1, 0], 3), np.delete(truth()[1] + 7, 3))
