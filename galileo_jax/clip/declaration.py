@@ -85,13 +85,13 @@ class Declaration:
                 (values[key],) = _numbers(_option(name), [number], 1)
         return values
 
-    def object_values(self) -> dict[str, dict[str, Any]]:
+    def object_values(self) -> defaultdict[str, dict[str, Any]]:
         """The values of each object that is named, by key.
 
         Raises:
           InputError: a value is no number, or no frame.
         """
-        objects: dict[str, dict[str, Any]] = defaultdict(dict)
+        objects: defaultdict[str, dict[str, Any]] = defaultdict(dict)
         for name, shape in self.shape.items():
             objects[name]["shape"] = shape
         for option, key, count in (("size", "size_m", None), ("point", "point_px", 2)):

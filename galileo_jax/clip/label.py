@@ -1,6 +1,5 @@
 """Writing what is known about a clip into the yaml beside it, if the result is valid."""
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,11 +30,8 @@ from galileo_jax.video.decode import probe
 
 KEY_ORDER = tuple(ClipFile.model_fields)
 
-# What says the same in another way goes.
-REPLACES = {
-    "rectangle": ("pixels_per_metre",),
-    "pixels_per_metre": ("rectangle",),
-}
+REPLACES = {"rectangle": "pixels_per_metre", "pixels_per_metre": "rectangle"}
+"""What says the same in another way, and goes."""
 
 
 @dataclass(frozen=True)
@@ -70,18 +66,21 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
         raise InputError(f"--level: {path} is not in folders of Physics 101")
     yaml_path = _yaml_path(path)
     is_new = not yaml_path.exists()
-    old = {} if is_new else read_mapping(yaml_path)
-    content, notes = _defaults(path, declared) if is_new else (copy.deepcopy(old), ())
+    content, notes = _defaults(path, declared) if is_new else (read_mapping(yaml_path), ())
     values, objects = declared.clip_values(), declared.object_values()
     for name in declared.correct:
-        was = _listed(yaml_path, content.get("objects"), name).get("corrections")
-        objects.setdefault(name, {})["corrections"] = declared.corrections(name, was)
+        listed = content.get("objects")
+        items = (one for one in listed if isinstance(one, dict)) if isinstance(listed, list) else ()
+        was = next((item for item in items if item.get("name") == name), None)
+        if was is None:
+            raise InputError(f"{yaml_path}: objects: there is no {name!r} to correct")
+        objects[name]["corrections"] = declared.corrections(name, was.get("corrections"))
     if not values and not objects:
         raise InputError(f"{path}: nothing to write; see galileo label --help")
     content |= values
-    for key, others in REPLACES.items():
-        if key in values:
-            content |= {other: None for other in others if content.get(other)}
+    for key, other in REPLACES.items():
+        if key in values and content.get(other):
+            content[other] = None
     for key, sd in UNCERTAINTY_OF.items():
         # A new value is not known as well as the old one was, unless somebody says so.
         if key in values and sd not in values and sd in content:
@@ -129,18 +128,6 @@ def _defaults(clip_path: Path, declared: Declaration) -> tuple[dict[str, Any], t
     fps = round(probe(clip_path).fps, 4)
     note = f"fps: {fps:g} taken from the video file; slow-motion files often state a wrong rate"
     return {"video": clip_path.name, "fps": fps}, (note,)
-
-
-def _listed(yaml_path: Path, listed: Any, name: str) -> Mapping[str, Any]:
-    """An object's entry in the yaml.
-
-    Raises:
-      InputError: there is none.
-    """
-    for item in listed if isinstance(listed, list) else ():
-        if isinstance(item, dict) and item.get("name") == name:
-            return item
-    raise InputError(f"{yaml_path}: objects: there is no {name!r} to correct")
 
 
 def _with_objects(

@@ -116,13 +116,13 @@ class SweepConfig(BaseModel):
         Raises:
           InputError: nothing has such a name.
         """
-        groups: dict[tuple[str, ...], None] = {}
+        groups: list[tuple[str, ...]] = []
         for entry in self.clips:
             if isinstance(entry, str):
-                groups |= dict.fromkeys((path,) for path in _matches(entry))
+                groups += [(path,) for path in _matches(entry)]
             else:
-                groups[tuple(path for name in entry for path in _matches(name))] = None
-        return tuple(groups)
+                groups.append(tuple(path for name in entry for path in _matches(name)))
+        return tuple(dict.fromkeys(groups))
 
 
 def read_config(config: str | Path | Mapping[str, Any]) -> tuple[str, str, dict[str, Any]]:
@@ -173,8 +173,8 @@ def make_configs(
     """
     plain = deepcopy(dict(content))
     for change in changes:
-        key, value = _split("--set", change)
-        _put(plain, f"--set {change}", key, _parsed(f"--set {change}", value))
+        (key, value), option = _split("--set", change), f"--set {change}"
+        _put(plain, option, key, _parsed(option, value))
     many = [_split("--multirun", run) for run in runs]
     options = [_parsed(f"--multirun {key}={text}", f"[{text}]") for key, text in many]
     configs = []

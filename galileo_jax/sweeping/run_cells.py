@@ -61,8 +61,7 @@ def carry_out(
         store.save_failure(outcome.key, outcome.failure)
         return {"failed": outcome.key, "why": outcome.failure.line}
 
-    stage = ("cells", len(to_compute), TRACKED, COMPUTED)
-    _carry_out(tasks(), engine, keep, report, stage)
+    _carry_out(tasks(), engine, keep, report, ("cells", len(to_compute), TRACKED, COMPUTED))
 
 
 def _track(
@@ -96,12 +95,8 @@ def _carry_out(
     shares of the sweep at its begin and end.
     """
     name, count, start, end = stage
-
-    def tell(done: int, partial: Any = None) -> None:
-        share = done / count if count else 1.0
-        report(f"{name}, {done} of {count} done", start + (end - start) * share, partial)
-
-    tell(0)
+    report(f"{name}, 0 of {count} done", start if count else end, None)
     for done, outcome in enumerate(engine.outcomes(tasks), 1):
-        tell(done, keep(outcome))
+        share = start + (end - start) * done / count
+        report(f"{name}, {done} of {count} done", share, keep(outcome))
         progress.check_cancelled()

@@ -14,7 +14,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -98,10 +98,8 @@ class Store:
 
     def page(self, name: str, clip: str = "") -> Path | None:
         """A cell's page, of several clips that of one of them; None where it has none."""
-        for path in (self.cell_folder(name) / clip / PAGE, self.cell_folder(name) / PAGE):
-            if path.is_file():
-                return path
-        return None
+        folders = (self.cell_folder(name) / clip, self.cell_folder(name))
+        return next((f / PAGE for f in folders if (f / PAGE).is_file()), None)
 
     def save_failure(self, name: str, failure: Failure) -> None:
         """Keeps why a cell has no result."""
@@ -131,12 +129,12 @@ class Store:
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:
         """Keeps a tracked clip."""
-        one, seen = measured.measurement, _fields(measured.measurement.observation)
+        one, seen = measured.measurement, vars(measured.measurement.observation)
         arrays = {name: value for name, value in seen.items() if isinstance(value, np.ndarray)}
         notes = {
             "clip": one.clip.model_dump(mode="json"),
             "seen": {name: value for name, value in seen.items() if name not in arrays},
-            "own": {name: value for name, value in _fields(one).items() if name not in APART},
+            "own": {name: value for name, value in vars(one).items() if name not in APART},
         }
         picture = np.frombuffer(measured.thumbnail or b"", np.uint8)
         with replacing(self._clip(key)) as path:
@@ -148,8 +146,3 @@ class Store:
 
     def _clip(self, key: str) -> Path:
         return self.folder / "clips" / f"{key[:32]}-{__version__}.track.npz"
-
-
-def _fields(one: Any) -> dict[str, Any]:
-    """Of a dataclass, by name, as they are."""
-    return {field.name: getattr(one, field.name) for field in fields(one)}
