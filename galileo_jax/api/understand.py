@@ -12,8 +12,7 @@ import numpy as np
 from galileo_jax.api.look import Look, look
 from galileo_jax.clip.load import check_clip, yaml_of
 from galileo_jax.clip.look import Likely, Seen, likely_in_plane, usual_shape
-from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.scenarios.scenario import Scenario
+from galileo_jax.clip.scenarios import SCENARIOS, Scenario
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import MAX_STEP_S
 from galileo_jax.clip.track_file import is_track

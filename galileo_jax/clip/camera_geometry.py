@@ -10,7 +10,6 @@ diagonals of the picture: k1 < 0 is a barrel, as wide lenses have it.
 Source: Hartley and Zisserman, Multiple View Geometry (2004), sections 2.3 and 7.4.
 """
 
-import math
 from typing import Annotated, Any
 
 import numpy as np
@@ -94,8 +93,3 @@ class Lens(BaseModel):
 
     k1: Annotated[Number, refused(dict.fromkeys((f"< {MIN_K1}", f"> {MAX_K1}"), NO_K1))]
     k1_sd: Annotated[Number, Field(ge=0, le=0.2)] = 0.0
-
-
-def half_diagonal_px(size_px: tuple[int, int]) -> float:
-    """The unit of a lens's r, px."""
-    return math.hypot(*size_px) / 2

@@ -6,6 +6,7 @@
 after a lens, where one is declared, has been taken out.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,7 +14,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.clip.camera_geometry import half_diagonal_px
 from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
@@ -116,7 +116,7 @@ def picture_plane(
         lens = {
             "k1": clip.lens.k1 if k1 is None else k1,
             "middle_px": ((width - 1) / 2, (height - 1) / 2),
-            "unit_px": half_diagonal_px(clip.frame_size_px),
+            "unit_px": math.hypot(width, height) / 2,
         }
     sign = 1.0 if clip.direction == "right" else -1.0
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M

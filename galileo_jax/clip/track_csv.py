@@ -37,6 +37,7 @@ from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.numbers import Rows, values_of
+from galileo_jax.table.read import ONLY
 
 TIME = "time_s"
 MIN_ROWS = 4
@@ -47,13 +48,9 @@ FAR_M, FAR_ALONE = 100.0, 10.0
 """What is further away, and by so many times further than half of the points, is in other units."""
 
 MAX_SPEED_M_S = 100.0  # nothing that is dropped or thrown is as fast; in millimetres 0.1 m/s is
-MAX_SD_M = UNMEASURED_SD_M
 MAX_SD_RAD = 1.0
 MAX_STEP_S = 1.0
 """No motion is seen in frames a second apart; a step of just 1 is a count of frames."""
-
-ONLY = "object1"
-"""The name of an object whose columns have none."""
 
 _ISOTROPIC = ("sd_along_m", "sd_m")
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
@@ -310,12 +307,14 @@ def _covariance(
     else:
         return roughness_covariance_m2(name, times, position)
     is_visible = np.isfinite(position[0])
-    is_right = (sd > 0).all(axis=0) & (sd <= MAX_SD_M).all(axis=0) & (np.abs(correlation) < 1)
+    is_right = (
+        (sd > 0).all(axis=0) & (sd <= UNMEASURED_SD_M).all(axis=0) & (np.abs(correlation) < 1)
+    )
     if not is_right[is_visible].all():
         at = int((is_visible & ~is_right).argmax())
         raise InputError(
             f"{lines[at]}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
-            f"most {MAX_SD_M:g} expected, correlation between -1 and 1"
+            f"most {UNMEASURED_SD_M:g} expected, correlation between -1 and 1"
         )
     covariance = np.einsum("at,ab->abt", sd**2, np.eye(len(sd)))
     covariance[0, 1] = covariance[1, 0] = correlation * sd[0] * sd[1]

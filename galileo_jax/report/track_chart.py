@@ -30,7 +30,7 @@ def look_chart(seen: Seen, table: TrackTable) -> Chart:
     """Every object's places along each axis, in the table's own units, axis below axis."""
     panels = []
     for i, axis in enumerate(table.axes):
-        marks = _places(table.names, clock, [np.asarray(one[i]) for one in table.position])
+        marks = _places(table.names, table.clock, [np.asarray(one[i]) for one in table.position])
         title = seen.path.name if i == 0 else ""
         xlabel = "frame" if table.is_in_frames else "time, s"
         panels.append(Panel(f"{axis}, {seen.unit or 'no unit'}", marks, title, xlabel))
@@ -45,6 +45,6 @@ def _places(
 ) -> tuple[Points, ...]:
     """All objects' places along one axis, `[object, frame]`."""
     return tuple(
-        Points(table.clock, places[i], object_colour(i), name, sd=None if sd is None else sd[i])
+        Points(clock, places[i], object_colour(i), name, sd=None if sd is None else sd[i])
         for i, name in enumerate(names)
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.numbers import Rows, is_nothing, is_number
-from galileo_jax.table.spreadsheet import is_spreadsheet, spreadsheet_rows
+from galileo_jax.table.spreadsheet import MAX_ROWS, is_spreadsheet, spreadsheet_rows
 from galileo_jax.table.text import content_of, decoded
 
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
@@ -21,7 +21,7 @@ COMMENT = re.compile(r"\s*(#+|%+|//)\s?")
 SAMPLE = 60
 """Lines that tell the dialect; from the middle on, where no titles are."""
 
-MAX_ROWS, MAX_CELLS, MAX_LINE = 200_000, 4_000_000, 200_000
+MAX_CELLS, MAX_LINE = 4_000_000, 200_000
 MAX_COLUMNS = 1000
 EMPTY = "empty; a row of titles and numbers expected"
 

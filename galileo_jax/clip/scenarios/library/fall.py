@@ -1,6 +1,6 @@
 """Fall: straight down from rest, onto a floor where the clip has one."""
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

@@ -4,7 +4,7 @@ The first frame in which the object is free is the start; how fast and which way
 is unknown. Gravity tells the scale where `pixels_per_metre` is null.
 """
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 # What no thrown body's path shows; `toss` has the same.
 WITHOUT = (

@@ -1,6 +1,6 @@
 """From above: pucks that slide, turn and hit each other on a level table, seen from above."""
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

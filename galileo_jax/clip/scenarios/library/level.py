@@ -3,7 +3,7 @@
 Whoever pushed it did so before the first frame that is used: how fast it is there is unknown.
 """
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

@@ -1,6 +1,6 @@
 """Liquid: sinking or rising in a liquid, with buoyancy, drag and the liquid carried along."""
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

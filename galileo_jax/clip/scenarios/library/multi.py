@@ -1,6 +1,6 @@
 """Multi: the ramp with any number of objects on the table."""
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

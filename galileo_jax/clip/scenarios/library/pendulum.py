@@ -3,7 +3,7 @@
 Gravity and the period tell the length, whatever the scale; the path tells where the pivot is.
 """
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

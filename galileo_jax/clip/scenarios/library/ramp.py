@@ -1,6 +1,6 @@
 """Ramp: the experiment of Galileo's ramp; object 1 slides down and may hit object 2."""
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

@@ -3,7 +3,7 @@
 The motion tells the period and the damping, whatever the scale; stiffness takes the mass.
 """
 
-from galileo_jax.clip.scenarios.scenario import Scenario, register
+from galileo_jax.clip.scenarios import Scenario, register
 
 register(
     Scenario(

@@ -4,8 +4,8 @@
 first impact.
 """
 
+from galileo_jax.clip.scenarios import Scenario, register
 from galileo_jax.clip.scenarios.library.flight import WITHOUT
-from galileo_jax.clip.scenarios.scenario import Scenario, register
 
 register(
     Scenario(
