@@ -11,7 +11,7 @@ from galileo_jax.api.questions import check_answered, questions
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
-from galileo_jax.clip.scenarios.scenario import Scenario
+from galileo_jax.clip.scenarios import Scenario
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.runtime.atomic_write import write_text
