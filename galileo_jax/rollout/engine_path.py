@@ -39,6 +39,7 @@ from galileo_jax.rollout.path_bodies import (
     Links,
     Number,
     Numbers,
+    apart,
     in_groups,
     of_group,
 )
@@ -185,7 +186,7 @@ class PathSystem(System):
             tuple(law.inertia[i] for i in objects),
             {i: 1 / law.rim[i] for i in objects if self.rolls[i]},
         )
-        a, slips = in_groups(forces.move, touches)
+        a, slips = in_groups(forces.move, forces.move(apart(self.count)), touches)
         rim = [jnp.zeros_like(one) for one in a]
         for i in forces.turning:
             turned = (direction[i] + slips[i]) * brake[i] * law.rim[i]
@@ -252,13 +253,14 @@ class PathSystem(System):
             e = jnp.where(approach > PLASTIC_M_S, self.law.restitution, 0.0)
             ahead.append(ahead[-1] + jnp.where(meets[i], e * approach, 0.0))
         inertia = [self.law.at_hits[i] for i in range(self.count)]
-        momentum = [m * (w - more) for m, w, more in zip(inertia, v, ahead, strict=True)]
+        behind = tuple(w - more for w, more in zip(v, ahead, strict=True))
+        momentum = [m * w for m, w in zip(inertia, behind, strict=True)]
 
         def together(links: Links) -> tuple[Numbers, None]:
             both = zip(of_group(momentum, links), of_group(inertia, links), strict=True)
             return tuple(p / m for p, m in both), None
 
-        common, _ = in_groups(together, tuple(meets))
+        common, _ = in_groups(together, (behind, None), tuple(meets))
         any_hits = functools.reduce(jnp.logical_or, hits)
         return [jnp.where(any_hits, common[i] + ahead[i], v[i]) for i in range(self.count)]
 

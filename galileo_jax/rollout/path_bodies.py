@@ -63,13 +63,20 @@ def of_group(values: Sequence[Number], links: Links) -> Numbers:
     return tuple(sum(beside(i, 1), sum(beside(i, -1), own)) for i, own in enumerate(values))
 
 
-def in_groups(move: Callable[[Links], tuple[Numbers, Any]], touches: Links) -> tuple[Numbers, Any]:
+def apart(count: int) -> Links:
+    """Every body a group of its own."""
+    return (False,) * (count - 1)
+
+
+def in_groups(
+    move: Callable[[Links], tuple[Numbers, Any]], alone: tuple[Numbers, Any], touches: Links
+) -> tuple[Numbers, Any]:
     """How bodies move when those that touch, and would pass those ahead, move as one.
 
-    `move`: what groups do, the first of it to compare. Groups grow until nobody passes anybody.
+    `move`: what groups do, the first of it to compare; `alone`: what each does by itself. Groups
+    grow until nobody passes anybody.
     """
-    links: Links = (False,) * len(touches)
-    found = move(links)
+    found, links = alone, apart(len(touches) + 1)
     for _ in touches:
         for i, touch in enumerate(touches):
             link = links[i] | (touch & (found[0][i] > found[0][i + 1]))
