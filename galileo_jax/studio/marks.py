@@ -1,6 +1,7 @@
 """What a person draws into a clip."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from galileo_jax.clip.scenarios import SCENARIOS
 
@@ -111,15 +112,20 @@ def moved(marks: Marks, handle: str, to: Point) -> Marks:
         corners = list(marks.rectangle)
         corners[CORNERS.index(handle)] = to
         return replace(marks, rectangle=tuple(corners))  # pyright: ignore
-    objects = tuple(replace(o, point=to) if o.name == handle else o for o in marks.objects)
-    return replace(marks, objects=objects)
+    return with_other(marks, handle, point=to)
+
+
+def with_other(marks: Marks, name: str, **given: Any) -> Marks:
+    """The marks with other values of one object."""
+    objects = (replace(one, **given) if one.name == name else one for one in marks.objects)
+    return replace(marks, objects=tuple(objects))
 
 
 def with_rectangle(marks: Marks, size_px: tuple[int, int]) -> Marks:
     """A rectangle to be laid on one of known sides, in place of the stick."""
-    (left, right), (top, bottom) = (
-        (round(a * side, 1), round(b * side, 1))
-        for a, b, side in ((0.3, 0.7, size_px[0]), (0.3, 0.7, size_px[1]))
+    sides = (size_px[0], size_px[0], size_px[1], size_px[1])
+    left, right, top, bottom = (
+        round(share * side, 1) for share, side in zip((0.3, 0.7, 0.3, 0.7), sides, strict=True)
     )
     corners = ((left, bottom), (right, bottom), (right, top), (left, top))
     return replace(marks, rectangle=corners)
@@ -127,15 +133,11 @@ def with_rectangle(marks: Marks, size_px: tuple[int, int]) -> Marks:
 
 def corrected(marks: Marks, name: str, frame: int, to: Point | None) -> Marks:
     """The marks with an object put right in a frame; None: no more."""
-
-    def put(one: ObjectMark) -> ObjectMark:
-        kept = [c for c in one.corrections if c[0] != frame]
-        if to is not None:
-            kept.append((frame, round(to[0], 2), round(to[1], 2)))
-        return replace(one, corrections=tuple(sorted(kept)))
-
-    objects = tuple(put(one) if one.name == name else one for one in marks.objects)
-    return replace(marks, objects=objects)
+    (was,) = (one.corrections for one in marks.objects if one.name == name)
+    kept = [one for one in was if one[0] != frame]
+    if to is not None:
+        kept.append((frame, round(to[0], 2), round(to[1], 2)))
+    return with_other(marks, name, corrections=tuple(sorted(kept)))
 
 
 def with_object(marks: Marks, at: Point) -> Marks:

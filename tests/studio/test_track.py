@@ -55,7 +55,7 @@ def test_a_track_is_drawn_while_it_runs_and_an_object_put_right_by_a_click(brows
         assert frame == FRAME and (said_x, said_y) == pytest.approx((x + 1.5, y - 1.0), abs=0.3)
         page.wait_for_selector("[data-stage=track][data-state=running]")
         page.wait_for_selector("[data-stage=track][data-state=done]")
-        assert page.get_by_text(f"object1 was put right in frame {FRAME}").is_visible()
+        assert page.get_by_text(f"object1 was corrected in frame {FRAME}").is_visible()
         after = places(folder)
         assert after[FRAME + 5] == pytest.approx(before[FRAME + 5], abs=0.2)
         assert page.locator(".slide u").count() == 1, "the scrubber shows where"

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from galileo_jax.clip.fields import SIZE_MEANING
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.studio.marks import Marks, ObjectMark, with_rectangle, without_object
+from galileo_jax.studio.marks import Marks, ObjectMark, with_other, with_rectangle, without_object
 from galileo_jax.studio.panels import parts
 from galileo_jax.studio.tab import Tab
 
@@ -137,9 +137,8 @@ def _size(tab: Tab, name: str, text: str) -> None:
 
 
 def _change(tab: Tab, name: str, **given: Any) -> None:
-    if (sheet := tab.session.sheet) is not None:
-        objects = (replace(o, **given) if o.name == name else o for o in sheet.marks.objects)
-        tab.change(objects=tuple(objects))
+    if tab.session.sheet is not None:
+        tab.mark(with_other(tab.session.sheet.marks, name, **given))
 
 
 def _drop(tab: Tab, name: str) -> None:
