@@ -243,12 +243,8 @@ def strength_texts(
 ) -> dict[str, str]:
     """The strengths of a candidate's effects as text, by name; one per clip where they differ.
 
-    Where no object was weighed, a force is given per mass: only that is determined.
-
-    Args:
-      effects: of the candidate.
-      entry: of the candidate in diagnosis.json.
-      sign: before a standard deviation.
+    Where no object was weighed, a force is given per mass: only that is determined. `entry`: of the
+    candidate in diagnosis.json; `sign`: before a standard deviation.
     """
     derived, parameters = entry.get("derived", {}), entry["parameters"]
     found = {}

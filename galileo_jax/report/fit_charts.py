@@ -104,14 +104,8 @@ def residual_panel(
 ) -> Panel:
     """Residuals in units of the noise against time, with the band of 95 % of noise.
 
-    Args:
-      times_s: `[frame]`.
-      residuals: two series `[frame]` by name: drawn filled and hollow.
-      index: of the object.
-      title: of the panel.
-      phases: of the motion.
-      highlight: the interval that fails.
-      largest: of residuals that the axis has to hold, beside these.
+    `residuals`: two series `[frame]` by name, drawn filled and hollow. `highlight`: the interval
+    that fails. `largest`: of other residuals that the axis has to hold.
     """
     (filled_name, filled), (hollow_name, hollow) = residuals.items()
     largest = max(largest, float(np.nanmax(np.abs([filled, hollow]), initial=0.0)))

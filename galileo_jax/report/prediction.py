@@ -94,9 +94,6 @@ def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], chart: Ch
     """Puts the prediction's section into the folder's report, in place of an earlier one.
 
     Without a report the section is a page of its own. first_and_last.png lies in the folder.
-
-    Returns:
-      the page that has it.
     """
     section = _section(run, found, chart, (folder / "first_and_last.png").read_bytes())
     page = folder / PAGE

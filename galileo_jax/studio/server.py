@@ -25,13 +25,9 @@ FIRST_PORT, NUM_PORTS = 8642, 20
 def serve(
     source: Path, *, port: int | None, browser: bool, announce: Callable[[str], object]
 ) -> None:
-    """Serves the studio until it is interrupted.
+    """Serves the studio until it is interrupted; `announce` is given the address when it listens.
 
-    Args:
-      source: a clip, or a folder with clips.
-      port: None: the first free one from 8642 on.
-      browser: whether to open one.
-      announce: is given the address when the server listens.
+    `source`: a clip, or a folder with clips. `port`: None: the first free one from 8642 on.
 
     Raises:
       InputError: there is no such file or folder, the port is taken, or NiceGUI is missing.

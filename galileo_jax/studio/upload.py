@@ -26,12 +26,6 @@ async def receive(
 ) -> Path:
     """Writes an upload into the folder once it is complete and what its name says.
 
-    Args:
-      root: the folder.
-      name: of the file.
-      chunks: its bytes.
-      limit: of its size.
-
     Raises:
       InputError: the name climbs out of the folder or is taken, the file is too large, or its
         content is no video, no table and no clip's yaml; nothing is left behind.
