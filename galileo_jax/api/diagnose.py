@@ -132,15 +132,12 @@ class Diagnosis:
         record = self.document.get("missing_force")
         if record is None:
             return None
-        columns = ("path_m", "speed_m_s", "acceleration_m_s2", "sd_m_s2", "formula")
+        columns = ["object", "time_s", "path_m", "speed_m_s", "acceleration_m_s2", "sd_m_s2"]
         parts = [
-            pd.DataFrame(
-                {"object": name, "time_s": record["time_s"]}
-                | {column: entry[column] for column in columns}
-            )
+            pd.DataFrame({"object": name, "time_s": record["time_s"], **entry})
             for name, entry in record["objects"].items()
         ]
-        return pd.concat(parts, ignore_index=True)
+        return pd.concat(parts, ignore_index=True)[[*columns, "formula"]]
 
     @in_float64
     def motions(self, effect: str) -> tuple[Motion, ...]:

@@ -19,7 +19,6 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 
-NUM_DRAWS = 200
 MOST_DRAWS = 10_000
 LONGEST_S = 60.0
 
@@ -106,7 +105,7 @@ def predict(
     fit: Fit | str | Path,
     *,
     seconds: float,
-    draws: int = NUM_DRAWS,
+    draws: int = 200,
     seed: int = 0,
     on_progress: progress.OnProgress | None = None,
     cancel: progress.CancelFlag | None = None,

@@ -47,9 +47,6 @@ def arguments_of(name: str) -> Mapping[str, Argument]:
     found = find_spec(galileo_jax.PLACES[name][0])
     assert found is not None and found.origin is not None
     body = ast.parse(Path(found.origin).read_text(encoding="utf-8")).body
-    constants = {
-        ast.unparse(node.targets[0]): node.value for node in body if isinstance(node, ast.Assign)
-    }
     function = next(n for n in body if isinstance(n, ast.FunctionDef) and n.name == name)
     described = (ast.get_docstring(function) or "").partition("Args:\n")[2].split("\n\n")[0]
     meanings = {key: " ".join(text.split()) for key, text in ARGUMENT.findall(described)}
@@ -59,8 +56,6 @@ def arguments_of(name: str) -> Mapping[str, Argument]:
     arguments = {}
     for argument, default in (*positional, *zip(given.kwonlyargs, given.kw_defaults, strict=True)):
         annotation = ast.unparse(argument.annotation) if argument.annotation else "str"
-        if isinstance(default, ast.Name):
-            default = constants[default.id]
         value = REQUIRED if default is None else ast.literal_eval(default)
         meaning = re.sub(r"(?<!\.)\.$", "", meanings[argument.arg])
         arguments[argument.arg] = Argument(annotation, value, meaning, argument in given.args)
