@@ -133,11 +133,12 @@ class Diagnosis:
         if record is None:
             return None
         columns = ["object", "time_s", "path_m", "speed_m_s", "acceleration_m_s2", "sd_m_s2"]
+        columns.append("formula")
         parts = [
-            pd.DataFrame({"object": name, "time_s": record["time_s"], **entry})
+            pd.DataFrame({"object": name, "time_s": record["time_s"], **entry}, columns=columns)
             for name, entry in record["objects"].items()
         ]
-        return pd.concat(parts, ignore_index=True)[[*columns, "formula"]]
+        return pd.concat(parts, ignore_index=True)
 
     @in_float64
     def motions(self, effect: str) -> tuple[Motion, ...]:

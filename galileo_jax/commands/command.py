@@ -97,16 +97,10 @@ def progress_display() -> Iterator[ProgressDisplay]:
     if not on.is_terminal:
         yield ProgressDisplay(None)
         return
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich import progress as rich
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=on, transient=True) as bar:
+    columns = (rich.TextColumn("{task.description}"), rich.BarColumn(), rich.TaskProgressColumn())
+    with rich.Progress(*columns, rich.TimeElapsedColumn(), console=on, transient=True) as bar:
         yield ProgressDisplay(bar)
 
 
