@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from galileo_jax.inference.fits.descent import Descent, GiveUp, ends_of, join
+from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
@@ -88,7 +88,8 @@ def test_slopes_are_taken_only_where_a_step_has_got_somewhere(monkeypatch):
 
     monkeypatch.setattr(residuals, "slopes", watched)
     descent = Descent(residuals, np.ones(3), is_smooth=True, is_central=False)  # pyright: ignore
-    found = descent(batch([-1.2, 1.0, 0.0]), 1e-9, 200)
+    count = FEW + 1  # of fewer all are
+    found = descent(batch(*[[-1.2, 1.0, 0.0]] * count), 1e-9, 200)
     assert all(np.diff(costs) < 0) and len(costs) < found.num_steps
 
 

@@ -26,13 +26,14 @@ from galileo_jax.inference.fits.residuals import (
     quadratic,
 )
 from galileo_jax.inference.joint_problem import NOISE_SD
-from galileo_jax.runtime.batching import in_chunks, one_at_a_time
+from galileo_jax.runtime.batching import MOTIONS, in_chunks, one_at_a_time
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 
 # Of a parameter's coarse step. The rigid engine rounds below its own; MuJoCo's contacts are rough
 # below theirs; above the largest a step may leave a plateau (nothing moves) over its edge, and the
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+FEW = 4  # proposals of which all slopes are taken
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
@@ -186,14 +187,16 @@ class Descent:
     ) -> Quadratic:
         """The cost round proposals; of those that cost more than where they set off no slopes.
 
-        A proposal in three is refused, and its slopes would be most of the work.
+        A proposal in three is refused, and its slopes would be most of the work, unless they are few:
+        then they tell `widths` where they are.
 
         `there`: the proposals. `own`: where they set off. `widths`: `[point, model parameter]`, of
         all points; those of `active` are changed. `active`: `[proposal]`, which points they are of.
         """
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)
-        better = np.flatnonzero(total < own.cost)
+        is_few = len(there.z) <= FEW and there.free.sum(axis=1).max() < MOTIONS[0]
+        better = np.arange(len(total)) if is_few else np.flatnonzero(total < own.cost)
         new = Quadratic(there.z, total, np.zeros_like(own.gradient), own.normal.copy())
         if better.size:
             some = [tuple(values[better] for values in own) for own in motions]
