@@ -187,8 +187,8 @@ class Descent:
     ) -> Quadratic:
         """The cost round proposals; of those that cost more than where they set off no slopes.
 
-        A proposal in three is refused, and its slopes would be most of the work, unless they are few:
-        then they tell `widths` where they are.
+        A proposal in three is refused, and its slopes would be most of the work; of few proposals
+        they are taken all the same, and tell `widths`.
 
         `there`: the proposals. `own`: where they set off. `widths`: `[point, model parameter]`, of
         all points; those of `active` are changed. `active`: `[proposal]`, which points they are of.
