@@ -68,7 +68,7 @@ def theta_of(problem, **given: float) -> np.ndarray:
 
 def integrated(scenario: str, top_m: float, **values: float) -> np.ndarray:
     """What SciPy makes of the same laws, at the frames."""
-    thing = draw_free(np.random.default_rng(0), scenario, {}, False).thing
+    thing = draw_free(np.random.default_rng(0), scenario, {}, False).things[0]
     values = {"m1": MASS_KG, **values}
     motion, _ = solve_free(PlaneTruth(scenario, (thing,), values, ((0.0, top_m),), TIMES_S[-1]))
     return motion.at(TIMES_S).position_m[0]
