@@ -152,7 +152,6 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     drawn = replicates(trials, fit, scales, sizes, labels, NUM_REPLICATES, seed)
     cells = _cells(trials, labels, scales)
     pulls = _pulls(trials, fit, theta)
-
     whitenings = [problem.data for problem in trials.problems]
     num_values = np.array([data.num_values for data in whitenings], dtype=float)
     used = fit.num_used * num_values / num_values.sum()

@@ -81,22 +81,15 @@ def metropolis_posterior(
         if is_second:
             before = total - part.warmup_steps - part.max_steps
             file = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
-
-        def report(state: Progress) -> None:
-            if on_block is not None:
-                steps = before + state.num_steps
-                on_block(replace(state, num_steps=steps, max_steps=total))
-
-        kernel = SAMPLERS.get(sampler)
         return sample(
             jax.random.fold_in(key, 1) if is_second else key,
-            kernel.from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
+            SAMPLERS.get(sampler).from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
             density_of(trials, fit, valley),
             jnp.asarray(begin),
             trials.names,
             settings=part,
             monitor=lambda w: watch(valley(w)),
-            on_block=report,
+            on_block=_of_both_runs(on_block, before, total),
             checkpoint=file,
             identity=identity,
         )
@@ -117,6 +110,18 @@ def metropolis_posterior(
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda w: trials.theta(valley(w)), trials.names)
+
+
+def _of_both_runs(
+    on_block: Callable[[Progress], None] | None, before: int, total: int
+) -> Callable[[Progress], None]:
+    """Tells `on_block` the progress of a run that begins after `before` steps of `total`."""
+
+    def report(state: Progress) -> None:
+        if on_block is not None:
+            on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
+
+    return report
 
 
 def learned(valley: Valley, w: np.ndarray) -> tuple[Valley, np.ndarray, np.ndarray]:

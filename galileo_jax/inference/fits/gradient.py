@@ -73,8 +73,10 @@ class GradientFitter:
       is_smooth: whether motion is smooth at every scale, as the rigid engine's is.
     """
 
-    def __init__(self, trials: JointProblem):
+    def __init__(self, trials: JointProblem, settled_nats: float = SETTLED_NATS):
+        """`settled_nats`: by less a last round lowers chi2 / 2, where motion is smooth."""
         self.trials, self.residuals = trials, Residuals(trials)
+        self._settled_nats = settled_nats
         self.is_smooth = trials.problems[0].engine.name == "rigid"
         self._count = len(trials.model_parameters)
 
@@ -207,13 +209,13 @@ class GradientFitter:
         points: Batch,
         owner: np.ndarray,
         lowest: float = np.inf,
-        settled: float = SETTLED_NATS,
+        settled: float | None = None,
     ) -> tuple[dict[int, GradientFit], float]:
         """Fits by the row of the point from which each came, and the least cost.
 
         Who joined another has none; `lowest`: the least cost of others.
         """
-        settled = settled if self.is_smooth else SETTLED_IF_ROUGH_NATS
+        settled = (settled or self._settled_nats) if self.is_smooth else SETTLED_IF_ROUGH_NATS
         found = polish(self._descent(), points, owner, settled, MOST_POLISH_STEPS, lowest)
         fits = laplace_fits(self.trials, self.residuals, found)
         return dict(zip(found.rows.tolist(), fits, strict=True)), found.lowest
