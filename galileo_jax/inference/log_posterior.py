@@ -9,7 +9,7 @@ What is measured is normal given z and x, with no linear model between.
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,13 +25,14 @@ from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.transport_map import Valley
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.samplers.program import Program
-from galileo_jax.inference.samplers.sampler import LogDensity
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.rollout.engine_jax import RECORDS
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.batching import FRAMES, rounded_up
 from galileo_jax.similarity.gaussian_likelihood import log_density_by_modes
+
+if TYPE_CHECKING:
+    from galileo_jax.inference.samplers.sampler import LogDensity
 
 # Of the draws of sizes: more of few measured values, whose squared number is what each costs.
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
@@ -109,12 +110,14 @@ class Part(NamedTuple):
 
 def density_of(
     trials: JointProblem, fit: GradientFit | None = None, valley: Valley | None = None
-) -> LogDensity:
+) -> "LogDensity":
     """The log density of one `z` in JAX; a `Program` where the engines are, which clips share.
 
     `fit`: of them, over whose sizes of imperfections is integrated, if it has any. `valley`: the
     density is one of its w, not of z.
     """
+    from galileo_jax.inference.samplers.program import Program
+
     draws, of_sizes = sizes_of(trials, fit, LEAST_SIZES)
     rolled, parts = [], []
     for index, problem in enumerate(trials.problems):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 
-from galileo_jax import report
+from galileo_jax.api import fit_result
 from galileo_jax.api.fit import OFF_THE_PLANE, fit
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
@@ -46,7 +46,7 @@ def precision():
 @pytest.fixture(autouse=True)
 def without_pages(monkeypatch):
     """Pages have tests of their own; only the fit shared by the module writes one."""
-    monkeypatch.setattr(report, "write_report", lambda run: None)
+    monkeypatch.setattr(fit_result, "write_report", lambda *_: None)
 
 
 def write_clip(folder, centres, times, scenario="ramp", **keys):
