@@ -70,7 +70,8 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     columns = Columns(heading, tuple(meanings), numbers)
     if not has_clock and not clocks:
         columns = _with_clock(columns)
-    if not has_place:
+    # What was called a place, or was the only column, may have turned out to be the time.
+    if not any(one.role in PLACES for one in columns.meanings):
         columns = _with_places(columns)
     return _with_likelihoods(_swapped_back(columns))
 

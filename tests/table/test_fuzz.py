@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from galileo_jax.runtime.errors import InputError
@@ -43,8 +43,16 @@ def damaged(draw: st.DrawFn) -> bytes:
     return content.decode().encode(encoding, "replace")
 
 
+CUT_IN_A_TIME = b"Z;0.2;0.3\n" + b"".join(
+    b"2024-05-14T09:31:00.%d0Z;0.%d;0.4\n" % (n, n) for n in range(10, 30)
+)
+"""What is left of the first row reads as titles, and the times as the column called z."""
+
+
 @settings(max_examples=300)
 @given(content=damaged())
+@example(content=CUT_IN_A_TIME)
+@example(content="\n".join(f"{n * 0.04:.2f}" for n in range(20)).encode())
 def test_damaged_tables(content: bytes, tmp_path_factory) -> None:
     reads_or_says(tmp_path_factory.getbasetemp() / "damaged.csv", content)
 
