@@ -16,7 +16,7 @@ for the advancement.
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -46,7 +46,6 @@ from galileo_jax.rollout.events import (
     Task,
     of_task,
     reaches_s,
-    step_by_events,
 )
 from galileo_jax.rollout.free_start import (
     Poses,
@@ -118,46 +117,56 @@ class BoxTable:
         place, turned, speed, _ = boxes.pose
         return Poses(*as_seen(place, speed, self.law.table_rad, self.scene), turned)
 
-    def to_first_hit(self, boxes: Boxes, time_s: jax.Array) -> tuple[Boxes, jax.Array]:
-        """The boxes as the first hit leaves them, and how long after `time_s` that is.
+    def record_later(
+        self, boxes: Boxes, time_s: jax.Array, dt_s: float, is_meeting: jax.Array
+    ) -> tuple[Boxes, jax.Array]:
+        """The boxes one recorded step later, and how long that is.
 
-        Records begin anew with the hit, so that it always is at the same place in a step: the
-        motion is as smooth in the parameters as bodies are, not as steps are.
+        When `is_meeting`, as the first hit leaves them, however long it takes: records begin anew
+        with the hit, so that it always is at the same place in a step. The motion is as smooth in
+        the parameters as bodies are, not as steps are.
         """
-        late_s, none_last = jnp.zeros(()), [jnp.zeros((), bool) for _ in self.pairs]
-        for _ in range(MEETING_STEPS):
-            times = [meets for _, _, meets in self._approaches(boxes.pose, time_s + late_s)]
-            soonest = jnp.min(jnp.stack(times))
-            spent_s = jnp.where(jnp.isfinite(soonest), soonest, 0.0)
-            boxes = self._moved(boxes, none_last, time_s + late_s, spent_s)
-            late_s = late_s + spent_s
-        return self._after_hits(boxes, time_s + late_s), late_s
+        step_s = jnp.where(is_meeting, jnp.inf, dt_s / SUBSTEPS)
+        most = jnp.where(is_meeting, MEETING_STEPS, MAX_EVENTS)
 
-    def record_later(self, boxes: Boxes, time_s: jax.Array, dt_s: float) -> Boxes:
-        """One recorded step."""
-        step_s = dt_s / SUBSTEPS
+        def is_left(carry: tuple[Boxes, jax.Array, jax.Array, Any]) -> jax.Array:
+            _, left_s, _, count = carry
+            return ((left_s > 0) | is_meeting) & (count < most)
 
-        def step(part: jax.Array, boxes: Boxes) -> Boxes:
-            begin_s = time_s + part * step_s
-            return step_by_events(self._to_next_hit, boxes, begin_s, step_s, MAX_EVENTS)
+        def to_next(carry: tuple[Boxes, jax.Array, jax.Array, Any]):
+            boxes, left_s, passed_s, count = carry
+            is_last = (count == most - 1) & ~is_meeting
+            boxes, spent_s, is_hit = self._to_next_hit(boxes, time_s + passed_s, left_s, is_last)
+            # What meets the hit's other bodies later is for later records.
+            left_s = jnp.where(is_meeting & is_hit, 0.0, left_s - spent_s)
+            return boxes, left_s, passed_s + spent_s, count + 1
 
-        return jax.lax.fori_loop(0, SUBSTEPS, step, boxes)
+        def step(_: jax.Array, carry: tuple[Boxes, jax.Array]) -> tuple[Boxes, jax.Array]:
+            boxes, passed_s = carry
+            found = jax.lax.while_loop(is_left, to_next, (boxes, step_s, passed_s, 0))
+            return found[0], found[2]
+
+        parts = jnp.where(is_meeting, 1, SUBSTEPS)
+        return jax.lax.fori_loop(0, parts, step, (boxes, jnp.zeros_like(time_s)))
 
     def _to_next_hit(
         self, boxes: Boxes, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array
-    ) -> tuple[Boxes, jax.Array]:
-        """Moves on until a hit is due, or by `left_s`; returns the boxes and the time it took.
+    ) -> tuple[Boxes, jax.Array, jax.Array]:
+        """Behind the next hit, or by `left_s`: boxes, the time it took, and whether any was due.
 
-        When `is_last`, by `left_s` in any case: what still comes then touches without a hit.
+        When `is_last`, by `left_s` in any case: what still comes then touches without a hit. Where
+        nothing ends the time nothing moves.
         """
-        boxes = self._after_hits(boxes, time_s)
         soonest, lasts = left_s, []
         for gap, rate, meets in self._approaches(boxes.pose, time_s):
             last = (gap < NEAR_M) & (rate > -PLASTIC_M_S)
             soonest = jnp.where(last, soonest, jnp.minimum(soonest, meets))
             lasts.append(last | is_last)
         spent_s = jnp.where(is_last, left_s, soonest)
-        return self._moved(boxes, lasts, time_s, spent_s), spent_s
+        spent_s = jnp.where(jnp.isfinite(spent_s), spent_s, 0.0)
+        boxes = self._moved(boxes, lasts, time_s, spent_s)
+        boxes, is_hit = self._after_hits(boxes, time_s + spent_s)
+        return boxes, spent_s, is_hit
 
     def _approaches(
         self, pose: Pose, time_s: jax.Array
@@ -213,8 +222,8 @@ class BoxTable:
         over = jnp.where(spent_s > 0, spent_s, 1.0)
         return Boxes(pose, stands / over, jnp.stack(pushes) / over)
 
-    def _after_hits(self, boxes: Boxes, time_s: jax.Array) -> Boxes:
-        """The boxes after the hits that are due; friction at the table takes part in them."""
+    def _after_hits(self, boxes: Boxes, time_s: jax.Array) -> tuple[Boxes, jax.Array]:
+        """The boxes after the hits that are due, and whether any is; the table rubs in them."""
         pose = boxes.pose
         spin = spins_rad_s(pose, self.masses.inertia_m2)
         points, any_hit = [], jnp.zeros((), bool)
@@ -236,7 +245,7 @@ class BoxTable:
             jnp.zeros((*stands.shape, 3)),
         )
         pose, _ = struck(pose, self.masses, Contacts(corners, points, self.pairs))
-        return boxes._replace(pose=pose)
+        return boxes._replace(pose=pose), any_hit
 
     def _acceleration(self, pose: Pose, time_s: jax.Array) -> Float[jax.Array, "box 3"]:
         """Of boxes that touch no other, to look ahead with."""
@@ -308,19 +317,21 @@ def free_poses(task: Task) -> Poses:
     num = jnp.asarray(task.num_records) if task.count is None else task.count
     begin = jnp.minimum(record_before_hit(*planar, scene, dt_s), num - 1)
     before = table.flat(planar[0][..., begin], planar[1][..., begin])
-    first, late_s = table.to_first_hit(before, begin * dt_s)
 
-    def record(i: jax.Array, carry: tuple[Boxes, Poses]) -> tuple[Boxes, Poses]:
-        boxes, made = carry
-        boxes = table.record_later(boxes, (i - 1) * dt_s + late_s, dt_s)
+    def record(i: jax.Array, carry: tuple[Boxes, jax.Array, Poses]):
+        boxes, late_s, made = carry
+        is_meeting = i == begin
+        from_s = jnp.where(is_meeting, i * dt_s, (i - 1) * dt_s + late_s)
+        boxes, passed_s = table.record_later(boxes, from_s, dt_s, is_meeting)
         kept = jax.tree.map(lambda all_, one: all_.at[..., i].set(one), made, table.seen(boxes))
-        return boxes, kept
+        return boxes, jnp.where(is_meeting, passed_s, late_s), kept
 
     length = planar[0].shape[-1]
     made = jax.tree.map(
-        lambda one: jnp.broadcast_to(one[..., None], (*one.shape, length)), table.seen(first)
+        lambda one: jnp.broadcast_to(one[..., None], (*one.shape, length)), table.seen(before)
     )
-    made = jax.lax.fori_loop(begin + 1, num, record, (first, made))[1]
+    none_s = jnp.zeros_like(planar[0], shape=())
+    _, late_s, made = jax.lax.fori_loop(begin, num, record, (before, none_s, made))
     at = jnp.minimum(jnp.arange(length), num - 1) - late_s / dt_s
     is_flat = (begin >= num - 1) | (planar[0][0, 0, begin] >= past_the_foot_m(scene))
 

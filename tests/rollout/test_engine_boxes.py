@@ -41,6 +41,9 @@ ALONE_ATOL_M = 1e-9
 FINER_ATOL_M = 1e-4
 
 
+FREE_POSES = jax.jit(of_task(free_poses), static_argnums=(0, 1, 2, 3))
+
+
 def of_boxes(objects: list[ClipObject], *effects: str) -> Model:
     """With the same effects in most tests: they share compiled programs."""
     return model_of(objects, effects=make_effects(["restitution", *effects]))
@@ -49,7 +52,7 @@ def of_boxes(objects: list[ClipObject], *effects: str) -> Model:
 def poses_of(model: Model, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places and velocities `[object, 3, record]` and quaternions."""
     effects, scene = model.effects + model.nuisances, with_depths(model.scene)
-    found = jax.jit(of_task(free_poses), static_argnums=(0, 1, 2, 3))(
+    found = FREE_POSES(
         effects, model.names, model.num_records + 1, model.record_dt_s, jnp.asarray(theta), scene
     )
     place, speed, turned = (np.asarray(own) for own in found)
