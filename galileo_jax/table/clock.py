@@ -1,5 +1,7 @@
 """Times as people and programs write them: seconds, m:s, h:m:s:frames, dates, to seconds.
 
+Of dates in any order of day and month the day has to be the same in all rows, and counts no more.
+
 Dates and clocks are counted from the first row on before anything is rounded.
 """
 
@@ -14,12 +16,16 @@ from galileo_jax.table.numbers import Numbers, Rows, is_nothing
 CLOCK = re.compile(r"(?:(\d{1,4}):)?(\d{1,4}):(\d{1,2})(?:[.,](\d+))?")
 FIELDS = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,3})")
 DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(:\d{2}([.,]\d+)?)?\s?(Z|[+-]\d{2}:?\d{2})?")
+DAY = re.compile(r"(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*([\d:.,]+)\s*([AaPp]\.?[Mm]\.?)?")
+"""Another date than `DATE`, its day, clock, and half of the day: 14.05.2024 09:31:02,033."""
+
+SAME_RATE = 0.1
 COMMON_FPS = (24, 25, 30, 48, 50, 60, 100, 120, 240)
 
 
 def is_time(cell: str) -> bool:
     """Whether a cell is a date or a clock, not a plain number."""
-    return ":" in cell and any(form.fullmatch(cell) for form in (CLOCK, FIELDS, DATE))
+    return ":" in cell and any(form.fullmatch(cell) for form in (CLOCK, FIELDS, DATE, DAY))
 
 
 def clock_times(rows: Rows, title: str, at: int, fps: float | None) -> Numbers | None:
@@ -31,6 +37,11 @@ def clock_times(rows: Rows, title: str, at: int, fps: float | None) -> Numbers |
     """
     cells = [(line, row[at] if at < len(row) else "") for line, row in rows]
     first = next((cell for _, cell in cells if not is_nothing(cell)), "")
+    if DATE.fullmatch(first) is None and DAY.fullmatch(first):
+        cells = [
+            (line, _clock_of_day(cell, first, f"line {line}: {title}")) for line, cell in cells
+        ]
+        first = next(cell for _, cell in cells if cell)
     form = next((one for one in (FIELDS, CLOCK, DATE) if one.fullmatch(first)), None)
     if form is None:
         return None
@@ -58,6 +69,23 @@ def clock_times(rows: Rows, title: str, at: int, fps: float | None) -> Numbers |
             "second is not told; write seconds, such as 0.125"
         )
     return _from_first(whole + counted / parts, 1.0 / parts)
+
+
+def _clock_of_day(cell: str, first: str, where: str) -> str:
+    """A date's clock; "" where there is none.
+
+    Raises:
+      InputError: it is of another half day than the first one's.
+    """
+    if is_nothing(cell):
+        return ""
+    usual, found = DAY.fullmatch(first), DAY.fullmatch(cell)
+    if usual is None or found is None or found.group(1, 4) != usual.group(1, 4):
+        raise InputError(
+            f"{where}: {cell[:40]!r} is no time of the same half day as {first[:40]!r}; write "
+            "seconds, such as 0.125"
+        )
+    return found[3]
 
 
 def _seconds(match: re.Match[str]) -> float:
@@ -93,6 +121,7 @@ def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> 
             return float(near)
     if 60 <= last.max() < 100 and (fps or 0) <= 60:
         return 100.0
-    if fps is not None and last.max() < round(fps) and np.median(steps) == 1:
-        return float(round(fps))
-    return None
+    told = (float(round(fps)), 100.0) if fps is not None and steps.size else ()
+    # From row to row one frame has gone by, or as many hundredths as a frame takes.
+    agree = (n for n in told if abs(fps * float(np.mean(steps)) / n - 1) < SAME_RATE)
+    return next((n for n in agree if last.max() < n), None)

@@ -5,17 +5,24 @@ t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,
 0.0,1.2E-2,-3.0E-3     t,x,y,x,y                    (s);(m);(m)       coords,x,y
 """
 
+import statistics
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.grid import COMMENT
 from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_number
-from galileo_jax.table.titles import Title, title_of, unit_of
+from galileo_jax.table.titles import LENGTHS, Title, title_of, unit_of
 
 MULTI = "multi:"
 AXES = ("x", "y", "z")
-RATES = ("frequency", "fps", "frame rate", "framerate", "sampling rate")
+RATES = (
+    *("frequency", "fps", "frame rate", "framerate", "sampling rate"),
+    *("capture frame rate", "export frame rate", "datarate", "camerarate"),
+)
+UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit")
 MARKERS = "marker_names"
 """Motion capture: three columns for each of the names that follow."""
 
@@ -53,7 +60,10 @@ def split_heading(rows: Rows) -> Heading:
     """
     width = max(len(row) for _, row in rows)
     words = _word_columns(rows, width)
-    start = next((n for n, (_, row) in enumerate(rows) if _is_body(row, words)), None)
+    usual = _num_usual(rows)
+    start = next(
+        (n for n, (_, row) in enumerate(rows)
+         if _is_body(row, words) and 2 * sum(map(bool, row)) > usual), None)  # fmt: skip
     if start is None:
         raise InputError(
             f"no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
@@ -75,6 +85,8 @@ def split_heading(rows: Rows) -> Heading:
     if cut is not None:  # a bad cell in the first row of numbers
         above, body = above[:cut], [*rows[cut:start], *body]
     titles = (above[at][1] if at >= 0 else []) + [""] * width
+    body = [(line, row) for line, row in body if at < 0 or row != above[at][1]]
+    titles = _with_clock_above(titles, [row for _, row in above[: max(at, 0)]])
     if at >= 0:
         _check_lengths(body, words, titles)
     units = next((row for _, row in above if _is_units(row)), [])
@@ -84,11 +96,14 @@ def split_heading(rows: Rows) -> Heading:
         if not (_is_units(row) or line in commented or _is_titles_again(row, titles))
     ]
     names = _names(over, width)
+    told = next((cell for cell in _beside(above, UNIT_OF_LENGTH) if unit_of(cell) in LENGTHS), "")
     meanings = []
     for n, text in enumerate(titles[:width]):
         meaning = title_of(text)
         if meaning.unit is None and n < len(units) and units[n]:
             meaning = replace(meaning, unit=unit_of(units[n]))
+        if meaning.unit is None and told and meaning.role in AXES:
+            meaning = replace(meaning, unit=unit_of(told))
         if not meaning.name and n < len(names) and meaning.role not in ("time", "frame"):
             meaning = replace(meaning, name=names[n])
         meanings.append(meaning)
@@ -107,6 +122,22 @@ def _is_titles_again(row: list[str], titles: list[str]) -> bool:
     """Whether a row has the same titles in other words (TrackMate), two axes at least."""
     pairs = ((title_of(a).role, title_of(b).role) for a, b in zip(row, titles, strict=False))
     return sum(one == other and one in AXES for one, other in pairs) > 1
+
+
+def _num_usual(rows: Rows) -> float:
+    """How many cells of a row are filled, in the middle of the table."""
+    later = rows[len(rows) // 2 :][:MOST_LOOKED_AT]
+    return statistics.median(sum(map(bool, row)) for _, row in later)
+
+
+def _with_clock_above(titles: list[str], above: list[list[str]]) -> list[str]:
+    """The titles, with those of a clock that stand in a row above where there is none."""
+    found = list(titles)
+    for row in above:
+        for n, cell in enumerate(row[: len(titles)]):
+            if not titles[n] and title_of(cell).role in ("time", "frame"):
+                found[n] = cell
+    return found
 
 
 def _is_value(cell: str) -> bool:
@@ -193,9 +224,15 @@ def _names(rows: list[list[str]], width: int) -> list[str]:
     return [" ".join(dict.fromkeys(parts)) for parts in zip(*chosen, strict=True)]
 
 
+def _beside(above: Rows, keys: Sequence[str]) -> Iterator[str]:
+    """What stands right of each key, and what stands below it."""
+    for row, below in pairwise([*(row for _, row in above), []]):
+        for n in (n for n, cell in enumerate(row) if cell.lower().strip(":= ") in keys):
+            yield from row[n + 1 : n + 2]
+            yield from below[n : n + 1]
+
+
 def _frame_s(above: Rows) -> float | None:
-    for _, row in above:
-        if len(row) > 1 and row[0].lower().strip(":= ") in RATES and is_number(row[1]):
-            rate = float(row[1].replace(",", "."))
-            return 1 / rate if rate > 0 else None
-    return None
+    rates = (float(cell.replace(",", ".")) for cell in _beside(above, RATES) if is_number(cell))
+    rate = next(rates, 0.0)
+    return 1 / rate if rate > 0 else None

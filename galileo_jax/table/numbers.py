@@ -16,7 +16,10 @@ Rows = list[tuple[int, list[str]]]
 """Each row's line number in the file, and its cells."""
 
 NOTHING = frozenset(
-    ("", "nan", "na", "n/a", "#n/a", "#nv", "#value!", "#wert!", "null", "none", "-", "--", "---")
+    (
+        *("", "nan", "-nan", "nan(ind)", "na", "n/a", "n.a.", "<na>", "null", "nil", "none"),
+        *("#n/a", "#nv", "#value!", "#wert!", "#div/0!", "?", "-", "--", "---"),
+    )
 )
 """What programs write where there is no number, lower case."""
 
@@ -28,7 +31,7 @@ MOST_LOOKED_AT = 500
 GROUPED = re.compile(r"[-+]?\d{1,3}(?:([,.' ])\d{3})(?:\1\d{3})*(?:([.,])\d*)?")
 """1,234.5 and 1.234,5: digits in groups of three."""
 
-SPACES = dict.fromkeys(map(ord, "\u00a0\u2009\u202f"), " ") | {ord("\u2212"): "-"}
+SPACES = dict.fromkeys(map(ord, "\u00a0\u2009\u202f"), " ") | {0x2212: "-", 0x2019: "'"}
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 bytes -> text -> grid of cells -> titles, units, names -> roles of columns -> numbers -> table
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -30,10 +31,13 @@ from galileo_jax.table.tracker_trk import is_trk, read_trk
 ONLY = "object1"
 """The name of an object whose columns have none."""
 
-UNIX_MS = (1e11, 1e14)
-"""Milliseconds since 1970 from 1973 on; no motion lasts as many."""
+UNIX = ((1e11, 1e-3), (1e14, 1e-6), (1e17, 1e-9))
+"""From how many on, and what each is in seconds: ms, us and ns since 1970, from 1973 on."""
 
 MOST_OBJECTS = 50
+
+SAME_CLOCK = 0.01
+"""Of what goes by on one clock: another that is further off is another one."""
 
 
 def read_table(path: Path, fps: float | None = None) -> TrackTable:
@@ -120,6 +124,7 @@ def _listed(columns: Columns) -> tuple[Column, ...]:
 def _clock(columns: Columns, lines: Sequence[int]) -> tuple[np.ndarray | None, float]:
     """Times `[row]`, s, and their resolution, or else frames and 0; None of neither."""
     role = "time" if columns.of("time") else "frame"
+    _check_one_clock(columns)
     if not (found := columns.of(role)):
         return None, 0.0
     values, title = columns.numbers[found[0]].values, columns.name_of(found[0])
@@ -132,11 +137,27 @@ def _clock(columns: Columns, lines: Sequence[int]) -> tuple[np.ndarray | None, f
     if written is not None and written not in SECONDS:
         raise InputError(f"{title}: a time in {written}; s, ms or us expected")
     per_unit = SECONDS[written] if written else 1.0
-    if written is None and UNIX_MS[0] < values[0] < UNIX_MS[1]:
-        per_unit = 1e-3
+    if written is None:
+        per_unit = next((each for least, each in UNIX[::-1] if values[0] > least), 1.0)
     if abs(values[0]) * per_unit > 1e6:  # a date: what is left of its digits begins at 0
         values = values - values[0]
     return values * per_unit, columns.numbers[found[0]].resolution * per_unit
+
+
+def _check_one_clock(columns: Columns) -> None:
+    """Refuses columns of time that go by at different rates: motions beside each other."""
+    clocks = {n: columns.numbers[n] for n in columns.of("time")}
+    gone = {n: float(np.ptp(one.seen)) * SECONDS.get(columns.meanings[n].unit or "s", math.nan)
+            for n, one in clocks.items() if one.steps.size and one.steps.min() > 0}  # fmt: skip
+    for n in gone:
+        first = next(iter(gone))
+        if columns.meanings[n].name != columns.meanings[first].name and (
+            abs(gone[n] - gone[first]) > SAME_CLOCK * gone[first]
+        ):
+            raise InputError(
+                f"{columns.name_of(first)!r} and {columns.name_of(n)!r} are two clocks; a table "
+                "for each expected"
+            )
 
 
 def _places(

@@ -33,7 +33,7 @@ RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
 UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
-NUMBERED = re.compile(r"([xyz])[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
+NUMBERED = re.compile(r"([xyz]|t(?=[_ ]?\d))[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
