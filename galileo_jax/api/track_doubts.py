@@ -17,6 +17,9 @@ FAR = 1000.0
 """chi2 per degree of freedom: residuals of thirty standard deviations on average. Few effects
 leave as much; a track of something else does."""
 
+MOST_OFF_PERCENT = 5.0
+"""Root mean square; tracks that people make by hand are within one or two."""
+
 TAKEN = {
     "ramp_angle_deg": "ramp_angle_deg as exact",
     "pixels_per_metre": "pixels_per_metre as known to a thousandth",
@@ -32,6 +35,11 @@ def with_track_doubts(
     if not wrong and not chi2 <= FAR:
         wrong = [f"no motion of this model comes close to the track (chi2 {chi2:.0f})"]
         found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
+    percent = result["error"].get("rms_percent_of_way") or 0.0
+    if not wrong and percent > MOST_OFF_PERCENT:
+        off = f"the best motion stays {percent:.0f} % of the way moved from the track"
+        wrong = [off]
+        found["warnings"] = [*result.get("warnings", []), f"{off}: {_look_at(measurements)}"]
     if wrong:
         said = [result["status"]] if result.get("status") else []
         found["status"] = "; but ".join([*said, ", ".join(wrong)])
@@ -40,10 +48,14 @@ def with_track_doubts(
 
 def _far(measurements: Sequence[Measurement], chi2: float) -> str:
     """What to look at where chi2 is in the thousands and no track is seen to go astray."""
-    text = (
+    return (
         f"chi2 per degree of freedom is {chi2:.0f}: before you conclude that a force is missing, "
-        "check that the track follows the objects"
+        f"{_look_at(measurements)}"
     )
+
+
+def _look_at(measurements: Sequence[Measurement]) -> str:
+    text = "check that the track follows the objects"
     absences = [
         (back - gone, name, back)
         for name, gone, back in filter(None, (longest_absence(m.observation) for m in measurements))

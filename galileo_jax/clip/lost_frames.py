@@ -18,7 +18,7 @@ SURE_SDS = 6.0
 
 MOST_LOST, LEAST_ROWS = 5, 12
 NEIGHBOURS = 2
-"""Steps on either side of a jump, which must be there and alike."""
+"""Steps on either side of a jump, which must be there, and nearer to each other than their size."""
 
 
 def with_lost_frames(times: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -83,7 +83,9 @@ def _lost_after(times: np.ndarray, place: np.ndarray, known: dict[int, int]) -> 
         around = [j for j in range(i - NEIGHBOURS, i + NEIGHBOURS + 1) if j != i]
         expected = np.median(per_frame[:, around], axis=1)
         length = float(np.linalg.norm(expected))
-        if length == 0:
+        sides = (per_frame[:, i - NEIGHBOURS : i], per_frame[:, i + 1 : i + 1 + NEIGHBOURS])
+        before, after = (np.mean(side, axis=1) for side in sides)
+        if np.linalg.norm(after - before) >= length:  # it stops there, sets out, or turns
             continue
         times_as_long = float(moved[:, i] @ expected) / length**2
         across = float(np.linalg.norm(moved[:, i] - times_as_long * expected))

@@ -94,8 +94,12 @@ def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[st
     finite = [one[np.isfinite(one)] for one in table.position[0]]
     spread = {axis: float(np.ptp(one)) if one.size else 0.0
               for axis, one in zip(table.axes, finite, strict=True)}  # fmt: skip
-    across = max(others, key=lambda axis: spread[axis])
     said: tuple[str, ...] = ()
+    is_flat = "z" in others and spread["y"] < MOST_OUT_OF_PLANE * min(spread["x"], spread["z"])
+    if up == "y" and is_flat and not of.scenario.is_level:
+        up, others = "z", ["x", "y"]
+        said = (f"{of.path}: z is taken as up, for it does not move along y (`track_up`)",)
+    across = max(others, key=lambda axis: spread[axis])
     for axis in others:
         if axis == across:
             continue

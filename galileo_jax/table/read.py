@@ -21,6 +21,7 @@ from galileo_jax.table.repeated import (
     unrounded,
     without_copies,
     without_repeats,
+    without_stand_ins,
 )
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
@@ -90,6 +91,8 @@ def _table(columns: Columns) -> TrackTable:
     is_counted = clock is None
     clock = np.arange(places.shape[-1], dtype=float) if clock is None else clock
     if not ids:
+        places, said = without_stand_ins(places, lines)
+        warnings += said
         places, said = without_copies(clock, places, resolution, lines)
         warnings += said
     return TrackTable(

@@ -18,6 +18,8 @@ MANY_DIGITS = 100.0
 """Units in the last place of a step: what moves so far does not stand at one place by chance."""
 COPY, PLACE = 0.5, 0.25
 """Of a step: a copied place is farther from where the path leads, and its original is nearer."""
+STAND_INS, FAR = frozenset((0.0, -1.0, -99.0, -999.0, -9999.0)), 2.0
+"""What programs write where nothing was seen; times the longest other step."""
 GOES_ON = 0.75
 """Of a step: a body goes on so far in a row, or it begins, ends or turns there by itself."""
 
@@ -146,13 +148,46 @@ def without_copies(
     rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
     if not rows.size:
         return places, []
-    listed = ", ".join(f"line {lines[row]}" for row in rows[:5])
-    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
     said = (
-        f"{listed}{more}: the place of the row beside it, to the last digit, while it "
+        f"{_listed(rows, lines)}: the place of the row beside it, to the last digit, while it "
         "moves: a copy, which counts as not seen"
     )
     return found, [said]
+
+
+def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndarray, list[str]]:
+    """Places `[object, axis, row]`, NaN where a number stands for "not seen", and what was done.
+
+    Such a place is 0, -1 or -9999 on all axes, or comes again and again to the last digit, and the
+    steps to and from it are longer than any other.
+    """
+    found, values = places.copy(), set()
+    for body, place in enumerate(places):
+        seen = np.flatnonzero(np.isfinite(place).all(axis=0))
+        steps = np.linalg.norm(np.diff(place[:, seen]), axis=0)
+        each, which = np.unique(place[:, seen].T, axis=0, return_inverse=True)
+        for value in range(len(each)) if len(seen) >= LEAST_ROWS else ():
+            there = which.ravel() == value
+            is_side = there[1:] != there[:-1]
+            others = steps[~there[1:] & ~there[:-1]]
+            comes_again = is_side.sum() > 2
+            if not (comes_again or set(each[value]) <= STAND_INS) or not others.size:
+                continue
+            if is_side.any() and np.median(steps[is_side]) > FAR * others.max() > 0:
+                found[body][:, seen[there]] = np.nan
+                values.add(", ".join(f"{one:g}" for one in each[value]))
+    rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
+    if not rows.size:
+        return places, []
+    said = (
+        f"{_listed(rows, lines)}: {' and '.join(sorted(values))}, far from all other rows, counts "
+    )
+    return found, [f"{said}as not seen"]
+
+
+def _listed(rows: np.ndarray, lines: Sequence[int]) -> str:
+    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
+    return ", ".join(f"line {lines[row]}" for row in rows[:5]) + more
 
 
 def _copied(clock: np.ndarray, values: np.ndarray, row: int, least: float) -> int | None:
