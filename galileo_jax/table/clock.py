@@ -123,5 +123,6 @@ def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> 
         return 100.0
     told = (float(round(fps)), 100.0) if fps is not None and steps.size else ()
     # From row to row one frame has gone by, or as many hundredths as a frame takes.
-    agree = (n for n in told if abs(fps * float(np.mean(steps)) / n - 1) < SAME_RATE)
+    rate = (fps or 0.0) * float(np.mean(steps)) if told else 0.0
+    agree = (n for n in told if abs(rate / n - 1) < SAME_RATE)
     return next((n for n in agree if last.max() < n), None)

@@ -168,14 +168,18 @@ def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndar
         each, which = np.unique(place[:, seen].T, axis=0, return_inverse=True)
         for value in range(len(each)) if len(seen) >= LEAST_ROWS else ():
             there = which.ravel() == value
-            is_side = there[1:] != there[:-1]
             others = steps[~there[1:] & ~there[:-1]]
-            comes_again = is_side.sum() > 2
-            if not (comes_again or set(each[value]) <= STAND_INS) or not others.size:
+            is_near = np.append(True, steps <= FAR * others.max(initial=0.0))
+            is_new = np.append(True, there[1:] != there[:-1])
+            runs = np.split(np.arange(len(seen)), np.flatnonzero(is_new)[1:])
+            runs = [run for run in runs if there[run[0]]]
+            if not others.any() or (len(runs) < 2 and not set(each[value]) <= STAND_INS):
                 continue
-            if is_side.any() and np.median(steps[is_side]) > FAR * others.max() > 0:
-                found[body][:, seen[there]] = np.nan
-                values.add(", ".join(f"{one:g}" for one in each[value]))
+            for run in runs:
+                sides = [at for at in (run[0], run[-1] + 1) if 0 < at < len(seen)]
+                if not is_near[sides].any():
+                    found[body][:, seen[run]] = np.nan
+                    values.add(", ".join(f"{one:g}" for one in each[value]))
     rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
     if not rows.size:
         return places, []

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
+from galileo_jax.tracking.contrast import in_contrast
 from galileo_jax.tracking.detect import CameraMovesError, find_movers, fit_outline
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
@@ -41,8 +42,8 @@ def track_clip(clip: Clip) -> Track:
     def advance(seen: Seen | None = None) -> None:
         partial = None
         if seen is not None:
-            shown = seen.places_px if view is None else map(view.shown, seen.places_px)
-            places = dict(zip(names, shown, strict=True))
+            drawn = seen.places_px if view is None else map(view.shown, seen.places_px)
+            places = dict(zip(names, drawn, strict=True))
             partial = {"frame": {"index": seen.frame, "places_px": places}}
         report("tracking", next(done) / total, partial)
 
@@ -51,14 +52,16 @@ def track_clip(clip: Clip) -> Track:
         return frames if view is None else view.drawn(frames)
 
     square = clip if view is None else view.clip(clip)
+    is_mixed = decode.is_interlaced(video)
+    shown = open_frames if is_mixed else in_contrast(open_frames, clip.frame_count)
     if passes == 3:
-        square = _with_points(square, open_frames, advance)
+        square = _with_points(square, shown, advance)
     starts = [_start(square, item) for item in square.objects]
     coding = Coding(decode.predicted_from_before(video))
     if view is not None:
         coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
     times_s = np.array(clip.frame_times_s)
-    found = track_video(open_frames, starts, times_s, coding=coding, advance=advance)
+    found = track_video(shown, starts, times_s, coding=coding, advance=advance)
     return found if view is None else view.track(found, clip)
 
 
@@ -76,7 +79,7 @@ def _start(clip: Clip, item: ClipObject) -> Start:
 
 
 def _with_points(
-    clip: Clip, open_frames: Callable[[], Iterator[np.ndarray]], advance: Callable[[], None]
+    clip: Clip, open_frames: Callable[[], Iterable[np.ndarray]], advance: Callable[[], None]
 ) -> Clip:
     """The clip with a `point_px` for every object: those not declared go to what moves."""
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
@@ -97,7 +100,7 @@ def _with_points(
             f"object(s) found to take for {len(missing)}; mark it: "
             f"galileo label {clip.video or clip.path} --help"
         )
-    first = grey(next(open_frames()))
+    first = grey(next(iter(open_frames())))
     found: dict[str, ClipObject] = {}
     for item, mover in zip(missing, movers, strict=False):
         found_at = {"point_px": mover.point_px, "first_frame": mover.first_frame}

@@ -135,6 +135,14 @@ def predicted_from_before(path: Path) -> np.ndarray:
     return is_predicted[scan.used] & (scan.is_square and not scan.is_interlaced)
 
 
+def is_interlaced(path: Path) -> bool:
+    """Whether pictures are fields, of which their colours may be mixed.
+
+    Raises `InputError` as `frames`.
+    """
+    return _scan(Path(path)).is_interlaced
+
+
 @dataclass(frozen=True)
 class _Scan:
     """What one pass through a film shows."""

@@ -100,6 +100,16 @@ def test_a_fit_of_a_lost_object_says_so(measured) -> None:
     assert found["status"] == "the fit converged; but object1 is lost from 0.63 s on"
 
 
+def test_a_fit_far_from_its_track_says_so_whatever_its_errors_are(measured) -> None:
+    def off(percent: float) -> dict:
+        return {"status": "", "error": {"chi2_per_dof": 1.1, "rms_percent_of_way": percent}}
+
+    assert with_track_doubts([measured], off(2.0)) == off(2.0)
+    found = with_track_doubts([measured], off(11.0))
+    assert "stays 11 % of the way moved from the track" in found["status"]
+    assert "check that the track follows the objects" in found["warnings"][0]
+
+
 def test_chi2_in_the_thousands_sends_to_the_overlay(measured) -> None:
     mask = measured.observation.mask.copy()
     mask[0, 6:18] = False

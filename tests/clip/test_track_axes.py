@@ -99,6 +99,30 @@ def test_lost_frames_are_named_and_their_time_put_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(whole.times_s, T, atol=1e-6)
 
 
+def test_frames_are_lost_beside_one_that_was_not_seen(tmp_path: Path) -> None:
+    kept = np.delete(np.arange(40), [15, 16, 27])
+    fall = FALL[kept]
+    fall[20] = np.nan
+    columns = {"t (s)": T[: len(kept)], "x (m)": NOISE[1][kept], "y (m)": fall}
+    found = observed(tmp_path, columns, "scenario: fall")
+    np.testing.assert_allclose(found.times_s[21:], T[kept][21:], atol=1e-4)
+    assert "missing after rows 14 (2), 24" in load_clip(tmp_path / "a.yaml").warnings[0]
+
+
+def test_where_a_body_stops_no_frame_is_lost(tmp_path: Path) -> None:
+    stopped = FALL[np.minimum(np.arange(40), 27)] + NOISE[1]
+    columns = {"t (s)": T, "x (m)": NOISE[1], "y (m)": stopped}
+    found = observed(tmp_path, columns, "scenario: fall")
+    np.testing.assert_allclose(found.times_s, T[: len(found.times_s)], atol=1e-6)
+
+
+def test_z_is_up_where_nothing_moves_along_y(tmp_path: Path) -> None:
+    columns = {"t (s)": T, "x (m)": 0.9 * T, "y (m)": 0.2 + NOISE[1], "z (m)": FALL}
+    found = observed(tmp_path, columns, "scenario: flight")
+    assert np.ptp(found.position_m[0, 1]) == pytest.approx(np.ptp(FALL), abs=1e-5)
+    assert any("z is taken as up" in one for one in load_clip(tmp_path / "a.yaml").warnings)
+
+
 def test_the_floor_ends_a_fall_of_one_coordinate(tmp_path: Path) -> None:
     """What was not measured across does not hide what was."""
     times = np.arange(60) / 60

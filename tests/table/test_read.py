@@ -100,6 +100,18 @@ FORMS = {
                                                    for n, (_, x, y) in enumerate(truth().T)]),
     "row_numbers_beside_times": text(body=[f"{n} {one}" for n, one in enumerate(lines(" "))]),
     "time_and_height_swapped": text("y,x,t"),
+    "titles_again": text("t,x,y", body=[*lines()[:9], "", "t,x,y", *lines()[9:]]),
+    "titles_over_two_rows": text("Units\tRate", "mm\t25", "Frame#\tTime\tball\t", "\t\tX1\tY1",
+                                 body=[f"{n}\t{one}" for n, one in enumerate(lines("\t"))]),
+    "a_number_alone_above": text("Trajectories", "100", "Frame,t,X,Y",
+                                 body=[f"{n},{one}" for n, one in enumerate(lines())]),
+    "unix_us": text("timestamp;x;y", body=clocked(lambda n: str(1715672462033000 + 40000 * n))),
+    "a_date_in_german": text("Datum;x;y", body=clocked(
+        lambda n: f"14.05.2024 09:31:0{n * 40 // 1000},{n * 40 % 1000:03d}")),
+    "a_date_in_american": text("date;x;y", body=clocked(
+        lambda n: f"5/14/2024 9:31:0{n * 40 // 1000}.{n * 40 % 1000:03d} AM")),
+    "two_clocks_that_agree": text("t1 (s),x,y,t2 (ms)", body=[
+        f"{one},{1000 * n * STEP_S + 7:.0f}" for n, one in enumerate(lines())]),
     "a_time_twice": text("t,x,y", body=[lines()[0], *lines()]),
 }  # fmt: skip
 
@@ -149,6 +161,10 @@ def test_thousands_marks(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
         read(tmp_path, text("frame;x;y", body=body)).position[0], expected
     )
+    swiss = [one.replace(",", "\u2019") for one in body]
+    np.testing.assert_array_equal(
+        read(tmp_path, text("frame;x;y", body=swiss)).position[0], expected
+    )
     german = [one.replace(",", "_").replace(".", ",").replace("_", ".") for one in body]
     np.testing.assert_array_equal(
         read(tmp_path, text("frame;x;y", body=german)).position[0], expected
@@ -156,13 +172,52 @@ def test_thousands_marks(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_in_many_ways(tmp_path: Path) -> None:
-    words = ["", "nan", "NaN", "-", "NA", "#N/A", "null"]
+    words = ["", "nan", "NaN", "-", "NA", "<NA>", "n.a.", "#N/A", "null"]
     body = lines()
     for n, word in enumerate(words):
         body[2 * n] = f"{truth()[0, 2 * n]},{word},{word}"
     table = read(tmp_path, text("t,x,y", body=body))
     assert np.isnan(table.position[0, 0, : 2 * len(words) : 2]).all()
     assert np.isfinite(table.position[0]).all(axis=0).sum() == ROWS - len(words)
+
+
+@pytest.mark.parametrize("word", ["0", "-1"])
+def test_a_number_that_stands_for_nothing_is_no_place(word: str, tmp_path: Path) -> None:
+    body, lost = lines(), [5, 6, 13]
+    for n in lost:
+        body[n] = f"{truth()[0, n]},{word},{word}"
+    table = read(tmp_path, text("t,x,y", body=[one + "\n" for one in body]))
+    assert np.flatnonzero(np.isnan(table.position[0, 0])).tolist() == lost
+    assert "not seen" in table.warnings[-1]
+
+
+def test_a_body_that_comes_to_a_place_again_was_there(tmp_path: Path) -> None:
+    """Pixels without a fraction: up and down through the same numbers, and at rest."""
+    places = np.concatenate([np.full(9, 0), np.rint(300 * np.sin(np.arange(60) / 6))]).astype(int)
+    table = read(tmp_path, text("frame,y", body=[f"{n},{y}" for n, y in enumerate(places)]))
+    np.testing.assert_array_equal(table.position[0, 0], places)
+
+
+def test_hundredths_are_told_from_frames_by_the_declared_rate(tmp_path: Path) -> None:
+    body = [f"0:00:00:{round(n / 0.6):02d} {x} {y}" for n, (_, x, y) in enumerate(truth().T)]
+    clock = read(tmp_path, text("#T X Y", body=body), fps=60.0).clock
+    np.testing.assert_allclose(clock, np.arange(ROWS) / 60, atol=0.006)
+    with pytest.raises(InputError, match="frames or hundredths"):
+        read(tmp_path, text("#T X Y", body=body))
+
+
+def test_a_unit_and_a_rate_in_the_heading(tmp_path: Path) -> None:
+    """As motion capture writes them: a word and its value beside it."""
+    heading = "Format,1.23,Capture Frame Rate,25,Length Units,Meters"
+    table = read(tmp_path, text(heading, ",,ball,", ",,Position,", "Frame,,X,Y", body=[
+        f"{n},,{x},{y}" for n, (_, x, y) in enumerate(truth().T)]))  # fmt: skip
+    assert (table.unit, table.frame_s) == ("m", 1 / 25)
+
+
+def test_two_clocks_in_one_table_are_refused(tmp_path: Path) -> None:
+    body = [f"{t},{y},{2 * t},{y}" for t, _, y in truth().T]
+    with pytest.raises(InputError, match="'t1' and 't2' are two clocks"):
+        read(tmp_path, text("t1,y1,t2,y2", body=body))
 
 
 def test_a_row_for_each_particle(tmp_path: Path) -> None:

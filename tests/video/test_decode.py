@@ -193,6 +193,14 @@ def test_what_an_edit_list_hides_is_not_there(tmp_path: Path) -> None:
     assert middle_of(next(frames(path)))[0] == pytest.approx(30 + 4 * 7, abs=0.5)
 
 
+def test_the_pattern_of_a_palette_is_no_comb_of_fields() -> None:
+    """Bayer's pattern, which a GIF lays over all of its picture, is the same two rows apart."""
+    pattern = 16 * np.indices((120, 480))[0] % 32
+    pictures = [(disc_at(30 + 5 * n, 60, (480, 120))[..., 0] // 32 * 32 + pattern).astype(np.uint8)
+                for n in range(7)]  # fmt: skip
+    assert first_field(np.sum([rows_of(*pair) for pair in pairwise(pictures)], axis=0)) is None
+
+
 @pytest.mark.parametrize("first", ["tff", "bff"])
 @pytest.mark.parametrize("step_px", [3, 20, 30])
 def test_the_first_field_shows_however_far_things_go(first: str, step_px: int) -> None:
