@@ -33,15 +33,17 @@ class Proposal:
     """What to draw into a video before a person has marked anything; pixels, x right, y down.
 
     Attributes:
-      scenario: ramp where the first object's path bends to the level, or a second one moves;
-        incline where it goes straight down.
+      scenario: flight where something flies, which is the first object; ramp where the first
+        object's path bends to the level, or a second one moves; incline where it goes straight
+        down.
       fps: what the container says, right or wrong.
-      objects: name to centre in the first frame, in the order in which they set out.
+      objects: name to centre where it is first seen, in the order in which they set out.
       sizes_px: name to about its (width, height) in the picture, object 1's along the ramp.
       direction: of the first object.
       ramp: (x1, y1, x2, y2), a line along the surface, the upper end first; None: not seen.
       foot: where the ramp meets the table; None: not seen.
       doubts: what could not be found, one line each.
+      first_frames: name to the frame in which it is first seen, of those that come later.
     """
 
     scenario: str
@@ -51,7 +53,8 @@ class Proposal:
     direction: Direction = "right"
     ramp: tuple[float, float, float, float] | None = None
     foot: Point | None = None
-    doubts: tuple[str, ...] = field(default=())
+    doubts: tuple[str, ...] = ()
+    first_frames: dict[str, int] = field(default_factory=dict)
 
 
 @in_float64
@@ -75,8 +78,8 @@ def propose(
       InputError: the video does not decode, nothing moves in it, or the camera does.
       Cancelled: `cancel` was set.
 
-    Limits: objects that are not there in the first frame are not found, nor those without texture
-    beside one with it.
+    Limits: of objects that are not there in the first frame, or have no texture beside one with it,
+    those are found that fly.
     """
     path = Path(video)
     with progress.scope(on_progress, cancel):
@@ -90,7 +93,7 @@ def propose(
             movers = find_movers(lambda: decode.frames(path), SPAN_PX, advance=advance)
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None
-        movers = [mover for mover in movers if not mover.first_frame]
+        movers = [mover for mover in movers if mover.flies or not mover.first_frame]
         movers = [mover for mover in movers if not mover.leaves_picture][:2] or movers[:1]
         if not movers:
             raise InputError(f"{path}: nothing moves in it; mark the objects by hand")
@@ -103,6 +106,9 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
     sizes = {name: _size(mover) for name, mover in zip(names, movers, strict=True)}
     objects = {name: mover.point_px for name, mover in zip(names, movers, strict=True)}
     direction: Direction = "right" if movers[0].goes_right else "left"
+    if movers[0].flies:
+        later = {n: m.first_frame for n, m in zip(names, movers, strict=True) if m.first_frame}
+        return Proposal("flight", fps, objects, sizes, direction, first_frames=later)
     doubts: list[str] = []
     for scenario in ("ramp", "incline"):
         seen = {n: objects[n] for n in (names if scenario == "ramp" else names[:1])}

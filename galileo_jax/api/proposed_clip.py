@@ -112,6 +112,7 @@ def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[st
         content |= {"origin_px": list(known.foot), "origin_sd_px": FOOT_SD_PX}
     content["objects"] = [
         {"name": f"object{n}", "shape": shape, "point_px": [float(x), float(y)]}
+        | ({"first_frame": first} if (first := known.first_frame((x, y))) else {})
         for n, (x, y) in enumerate(points, 1)
     ]
     if scenario.has_table:  # nobody has said when object 1 is let go: its motion does

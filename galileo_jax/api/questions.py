@@ -141,9 +141,10 @@ def _points(known: Understood) -> Question | None:
         return Question("points", text, known.unseen, "--point 312 221")
     listed = "; ".join(
         f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
+        + (f", from frame {first} on" if (first := known.first_frame((x, y))) else "")
         for n, ((x, y), (width, height)) in enumerate(things.items(), 1)
     )
-    why = f"{len(things)} things move, in the order in which they set out: {listed}"
+    why = f"{len(things)} things move: {listed}"
     likeliest = list(things).index(known.likeliest) if known.likeliest else 0
     meant = list(things)[:2] if known.is_pair else [list(things)[likeliest]]
     example = " ".join(f"--point {x:.0f} {y:.0f}" for x, y in meant)

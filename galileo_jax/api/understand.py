@@ -70,6 +70,7 @@ class Understood:
       declared: what it says; empty where there is none.
       look: what `look` makes of the source.
       things: what moves in a film whose yaml names no objects, to its size in the picture, px.
+      first_frames: in which of these are first seen that come later.
       foot: of a ramp that such a film shows, px; None: it shows none.
       unseen: why no moving thing was found in such a film; "" where one was.
       is_pair: one thing sets out after the other, as on a ramp into another.
@@ -80,6 +81,7 @@ class Understood:
     declared: Mapping[str, Any]
     look: Look
     things: Mapping[Point, Point] = field(default_factory=dict)
+    first_frames: Mapping[Point, int] = field(default_factory=dict)
     foot: Point | None = None
     is_pair: bool = False
     unseen: str = ""
@@ -132,11 +134,17 @@ class Understood:
             name = likely.scenario if (likely := self.likely(answers)) else None
         return SCENARIOS[name] if name is not None and name in SCENARIOS else None
 
+    def first_frame(self, point: Point) -> int:
+        """In which frame the thing at a place is first seen; 0 where nothing is known to come."""
+        for place, frame in self.first_frames.items():
+            if math.dist(point, place) <= max(self.things[place]) / 2:
+                return frame
+        return 0
+
     def path(self, point: Point) -> FilmPath:
-        """The way of the thing at a place of the first frame; it is followed once."""
+        """The way of the thing at a place where it is first seen; it is followed once."""
         if point not in self._paths:
-            fps = self.look.fps or USUAL_FPS
-            self._paths[point] = _followed(self.source, self.yaml_path, point, fps)
+            self._paths[point] = _followed(self, point)
         return self._paths[point]
 
 
@@ -222,19 +230,25 @@ def _with_things(known: Understood) -> Understood:
         why = str(error).removeprefix(f"{known.source}: ")
         return replace(known, unseen=why.removesuffix("; mark the objects by hand"))
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
-    is_pair = len(things) > 1 and not proposal.doubts
-    foot = proposal.foot if proposal.scenario == "ramp" else None
-    return replace(known, things=things, foot=foot, is_pair=is_pair)
+    is_ramp = proposal.scenario == "ramp"
+    return replace(
+        known,
+        things=things,
+        first_frames={proposal.objects[name]: at for name, at in proposal.first_frames.items()},
+        foot=proposal.foot if is_ramp else None,
+        is_pair=is_ramp and len(things) > 1 and not proposal.doubts,
+    )
 
 
-def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPath:
+def _followed(known: Understood, point: Point) -> FilmPath:
     from galileo_jax.measurement.track_cache import track_once
 
     item = {"name": "object1", "shape": usual_shape(""), "point_px": list(point)}
-    content = {"video": source.name, "scenario": "flight", "objects": [item]}
+    item["first_frame"] = known.first_frame(point)
+    content = {"video": known.source.name, "scenario": "flight", "objects": [item]}
     progress.report("following what moves", 0.9)
     try:
-        clip = check_clip(yaml_path, content | {"fps": fps})
+        clip = check_clip(known.yaml_path, content | {"fps": known.look.fps or USUAL_FPS})
         track = track_once(clip)
     except InputError:
         return FilmPath(None)

@@ -23,7 +23,8 @@ def proposed(found: Mapping[str, Any], size_px: tuple[int, int]) -> Marks:
         ObjectMark(name, (round(x, 1), round(y, 1))) for name, (x, y) in found["objects"].items()
     )
     stick = _stick(size_px, None)[0]
-    return Marks(found["scenario"], found["fps"], objects, upper, foot, stick)
+    marks = Marks(found["scenario"], found["fps"], objects, upper, foot, stick)
+    return replace(marks, first_frame=found["first_frames"].get(objects[0].name, 0))
 
 
 def blank(fps: float, size_px: tuple[int, int]) -> Marks:

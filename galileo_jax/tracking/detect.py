@@ -2,8 +2,10 @@
 
 Features of the first frame are followed through the whole video. Those that set out together,
 from places close to each other, and keep going the same way are one thing. A thing that leaves
-the picture is a hand; of the others the first to move is object 1. Where no features do, as those
-of a small ball in flight, it is the silhouette that goes farthest.
+the picture is a hand; of the others the first to move is object 1. Before it comes what flies: a
+silhouette that goes evenly to the side and falls evenly faster, as nothing does that is held or
+stands on something. Where no features move and nothing flies, it is the silhouette that goes
+farthest.
 """
 
 from collections.abc import Callable, Iterable
@@ -14,10 +16,11 @@ import cv2
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
+from galileo_jax.observation.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.silhouette import paths_of
+from galileo_jax.tracking.silhouette import Path, paths_of
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
@@ -32,6 +35,9 @@ MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03  # share of the frame's width within which a thing counts as at the border
 LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked by chance
+STRAY, LEAST_WAY = 0.03, 3.0
+"""Of its way, by which what flies is off a parabola in time, and by more of which that is bent; how
+many of its sizes it flies at least."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,7 @@ class Mover:
     places_px: np.ndarray  # `[feature, 2]`, the features in that frame; of a silhouette two corners
     goes_right: bool = True  # whether its features were last seen to the right of where they began
     first_frame: int = 0  # in which it is seen
+    flies: bool = False  # whether nothing but its weight moves it
 
 
 class CameraMovesError(InputError):
@@ -59,10 +66,10 @@ def find_movers(
     axes_angle_rad: float = 0.0,
     advance: Callable[[], None] = lambda: None,
 ) -> list[Mover]:
-    """The things that move, those that stay in the picture first, each kind by onset.
+    """The things that move: what flies, what stays in the picture, the others; each by onset.
 
     Args:
-      open_frames: gives the frames; called once, or three times where no features move.
+      open_frames: gives the frames; called three times.
       span_px: about the size of an object; features farther apart are linked by others only.
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
       advance: called after every frame.
@@ -70,7 +77,7 @@ def find_movers(
     Raises:
       CameraMovesError: the whole picture moves, so that nothing says what is in motion.
 
-    Limits: beside a thing with texture, those without, or that come later, are not found.
+    Limits: beside a thing with texture, those without, or that come later, are found if they fly.
     """
     path, size_px = _feature_paths(open_frames, advance)
     moved = np.linalg.norm(path - path[:1], axis=2) > MOVED_PX
@@ -80,9 +87,9 @@ def find_movers(
     onset = np.where(settled.any(axis=0), settled.argmax(axis=0), -1)
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
-    movers = []
+    movers, groups = [], _groups(path, onset, span_px)
     margin = BORDER_SHARE * size_px[0]
-    for members in _groups(path, onset, span_px):
+    for members in groups:
         places, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
         beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
         movers.append(
@@ -95,22 +102,46 @@ def find_movers(
                 goes_right=bool(np.median(last[:, 0] - places[:, 0]) >= 0),
             )
         )
-    if not movers:
-        return _silhouettes(open_frames, len(path))
-    return sorted(movers, key=lambda mover: (mover.leaves_picture, mover.onset_frame))
+    ways = [
+        one for one in paths_of(open_frames, np.arange(len(path))) if len(one.parts) >= LEAST_SEEN
+    ]
+    known = [path[:, members] for members in groups]
+    flying = [one for one in ways if _flies(one) and not any(_is_same(one, own) for own in known)]
+    if not movers and not flying:
+        farthest = max(ways, key=lambda one: one.way_px, default=None)
+        if farthest is None or farthest.way_px < farthest.parts[0].size_px:
+            return []
+        return [_silhouette(farthest)]
+    movers += [_silhouette(one) for one in flying]
+    return sorted(movers, key=lambda one: (not one.flies, one.leaves_picture, one.onset_frame))
 
 
-def _silhouettes(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> list[Mover]:
-    """The thing whose silhouette goes farthest, by more than its size; empty: there is none."""
-    paths = [one for one in paths_of(open_frames, np.arange(count)) if len(one.parts) >= LEAST_SEEN]
-    found = max(paths, key=lambda one: one.way_px, default=None)
-    if found is None or found.way_px < found.parts[0].size_px:
-        return []
-    first, frame, last = found.parts[0], found.frames[0], found.parts[-1]
+def _silhouette(path: Path) -> Mover:
+    first, frame = path.parts[0], path.frames[0]
     x, y = first.centre_px
     corners = np.stack([first.low_px, first.high_px]).astype(float)
-    goes_right = bool(last.centre_px[0] >= x)
-    return [Mover((float(x), float(y)), frame, 0, False, corners, goes_right, frame)]
+    goes_right = bool(path.parts[-1].centre_px[0] >= x)
+    point = (float(x), float(y))
+    return Mover(point, frame, 0, False, corners, goes_right, frame, _flies(path))
+
+
+def _flies(path: Path) -> bool:
+    """Whether a silhouette moves as what is thrown or dropped: evenly across, ever faster down."""
+    place, way = path.places_px, path.way_px
+    if way < LEAST_WAY * float(np.median(path.sizes_px)):
+        return False
+    since = 2 * (np.array(path.clock) - path.clock[0]) / (path.clock[-1] - path.clock[0]) - 1
+    down = polynomial(since, place[:, 1], 2)
+    left = np.stack([polynomial(since, place[:, 0], 1).left, down.left])
+    return bool(np.abs(left).max() < STRAY * way and down.solution[0] > STRAY * way)
+
+
+def _is_same(path: Path, places: np.ndarray) -> bool:
+    """Whether a silhouette is the thing of features `[frame, feature, 2]`, while these are seen."""
+    frames = [i for i, frame in enumerate(path.frames) if np.isfinite(places[frame, :, 0]).any()]
+    seen = places[np.array(path.frames, int)[frames]]
+    off = np.hypot(*np.moveaxis(np.nanmedian(seen, axis=1) - path.places_px[frames], -1, 0))
+    return bool(len(frames) and np.median(off) < np.median(path.sizes_px))
 
 
 def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:

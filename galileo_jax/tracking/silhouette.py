@@ -2,7 +2,7 @@
 
 A camera that stands still shows the same scene all the time but for what moves in it:
 
-    scene = median over the film          silhouette = |picture - scene| > noise
+    scene = median over the film          silhouette = |picture - scene| > noise, in any colour
 
 Connected parts of it are linked from frame to frame to paths. Their centres do not need texture,
 are not carried along by marks that turn, and are the mean place of what is smeared; but nothing is
@@ -18,7 +18,6 @@ from jaxtyping import Float
 
 from galileo_jax.observation.least_squares import polynomial
 from galileo_jax.tracking.pose import length
-from galileo_jax.tracking.template import grey
 
 SCENE_FRAMES = 15  # evenly over the film, show the scene: what is elsewhere in most is not in it
 NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or grey levels, is noise
@@ -113,7 +112,7 @@ def paths_of(
     done: list[Path] = []
     going: list[Path] = []
     for index, frame in enumerate(open_frames()):
-        parts, now = _parts(grey(frame), scene), float(clock[index])
+        parts, now = _parts(frame, scene), float(clock[index])
         done += [path for path in going if now - path.clock[-1] > MOST_MISSED]
         going = [path for path in going if now - path.clock[-1] <= MOST_MISSED]
         pairs = [
@@ -132,23 +131,24 @@ def paths_of(
 
 
 def _scene(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> np.ndarray:
-    """The median of some frames, `[height, width]` float32."""
+    """The median of some frames, `[height, width]` or with colours behind, int16."""
     chosen = set(np.linspace(0, count - 1, min(count, SCENE_FRAMES)).astype(int).tolist())
-    kept = [grey(frame) for index, frame in enumerate(open_frames()) if index in chosen]
+    kept = [frame for index, frame in enumerate(open_frames()) if index in chosen]
     rows = [np.median([one[row] for one in kept], axis=0) for row in range(len(kept[0]))]
-    return np.array(rows, np.float32)
+    return np.array(rows, np.int16)
 
 
 def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
-    """What differs from the scene, largest first, without what the picture's edge cuts."""
-    differs = cv2.GaussianBlur(picture.astype(np.float32) - scene, (0, 0), SMOOTH_PX)
-    some = differs[::4, ::4]
-    middle = float(np.median(some))
-    noise = 1.4826 * float(np.median(np.abs(some - middle)))
-    mask = (np.abs(differs - middle) > max(NOISE_SDS * noise, LEAST_GREY)).astype(np.uint8)
+    """What differs from the scene in any colour, largest first, without what the edge cuts."""
+    differs = cv2.GaussianBlur(picture.astype(np.int16) - scene, (0, 0), SMOOTH_PX)
+    some = np.atleast_3d(differs)[::4, ::4]
+    middle = np.median(some, axis=(0, 1))
+    noise = 1.4826 * np.median(np.abs(some - middle), axis=(0, 1))
+    most = np.maximum(NOISE_SDS * noise, LEAST_GREY)
+    mask = cv2.inRange(differs, middle - most, middle + most) == 0
     if mask.mean() > MOST_FOREGROUND:
         return []
-    _, _, stats, centres = cv2.connectedComponentsWithStats(mask)
+    _, _, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     height, width = mask.shape
     found = []
     for (left, top, wide, high, area), centre in zip(stats[1:], centres[1:], strict=True):

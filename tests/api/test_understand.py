@@ -13,7 +13,7 @@ from galileo_jax.api.questions import parsed, questions
 from galileo_jax.api.understand import is_declared, understand
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.runtime.errors import InputError
-from tests.tracking.moving_box import Box, film
+from tests.tracking.moving_box import RELEASE, Box, film, throw
 
 T = np.arange(30) / 25
 FLIGHT = ("t (s);x (m);y (m)", (T, 2 * T, 3 * T - 4.905 * T**2))
@@ -161,8 +161,10 @@ def test_the_yaml_of_a_table_in_which_nothing_is_open_has_no_comment_left(tmp_pa
 
 def filmed(folder: Path, *paths: np.ndarray) -> Path:
     """A film of boxes that move as paths `[frame, 3]` say."""
-    boxes = [(Box(seed=4 * n), path) for n, path in enumerate(paths)]
-    frames = film(boxes)
+    return written(folder, film([(Box(seed=4 * n), path) for n, path in enumerate(paths)]))
+
+
+def written(folder: Path, frames: list[np.ndarray]) -> Path:
     video = folder / "clip.mp4"
     size = frames[0].shape[1::-1]
     writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, size)
@@ -239,6 +241,23 @@ def test_of_a_hand_and_what_it_lets_go_the_latter_is_the_default(tmp_path):
     assert np.hypot(x - 50, y - 60) < 8
     assert asked[0].option == f"--point {x:.0f} {y:.0f}", "a call that would do"
     assert "scenario" not in [one.key for one in asked], "that of the default"
+
+
+@pytest.mark.video
+def test_a_thrown_ball_is_followed_from_when_it_leaves_the_hand(tmp_path):
+    frames, ball = throw()
+    known = understand(written(tmp_path, frames))
+    asked = questions(known, {})
+    assert (asked[0].key, asked[0].default) == ("points", "1")
+    said = parsed(asked[0], "1", known, {})
+    first = known.first_frame(said["points"][0])
+    assert RELEASE <= first < RELEASE + 5 and f"from frame {first} on" in asked[0].why
+    rough = [(round(x), round(y)) for x, y in said["points"]]  # as `--point` is written
+    for points in (said["points"], rough):
+        content = yaml.safe_load(yaml_of(known, {"points": points}))
+        (declared,) = content["objects"]
+        assert content["scenario"] == "flight" and declared["first_frame"] == first
+        np.testing.assert_allclose(declared["point_px"], ball[first], atol=1.5)
 
 
 @pytest.mark.video

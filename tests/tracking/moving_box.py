@@ -115,3 +115,19 @@ def slide(frames: int = 40, turn_at: int = 24, turn_rad: float = -0.35) -> np.nd
     y = 40.7 - on_ramp * np.sin(turn_rad)
     angle = turn_rad * np.clip((time - turn_at + 1) / 2, 0, 1)
     return np.stack([x, y, angle], axis=1)
+
+
+RELEASE = 10
+"""The frame of `throw` in which the hand lets go."""
+
+
+def throw(size_px: tuple[int, int] = (320, 200)) -> tuple[list[np.ndarray], np.ndarray]:
+    """Pictures of a hand that throws a ball, green and as bright as the wall behind; its path."""
+    time = np.arange(36.0)
+    held, since = np.minimum(time, RELEASE), np.maximum(time - RELEASE, 0)
+    ball = np.stack([40 + 4 * held + 8 * since, 150 - 4 * held - 7 * since + 0.35 * since**2], 1)
+    hand = np.stack([34 + 4 * held, 158 - 4 * held, 0 * time], axis=1)
+    frames = film([(Box((28, 24), seed=7), hand)], size_px=size_px)
+    for frame, (x, y) in zip(frames, ball, strict=True):
+        cv2.circle(frame, (round(16 * x), round(16 * y)), 16 * 6, (40, 170, 80), -1, cv2.LINE_AA, 4)
+    return frames, ball

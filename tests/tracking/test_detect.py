@@ -5,7 +5,7 @@ import pytest
 
 from galileo_jax.tracking.detect import find_movers, fit_outline
 from galileo_jax.tracking.template import Outline, grey
-from tests.tracking.moving_box import Box, film
+from tests.tracking.moving_box import RELEASE, Box, film, throw
 
 pytestmark = pytest.mark.video
 
@@ -76,3 +76,12 @@ def test_outline_is_moved_to_the_sharp_sides():
     places = own @ np.array([[c, s], [-s, c]]) + pose[:2]
     centre = fit_outline(image, places, Outline(FIRST.size_px, 0.3))
     np.testing.assert_allclose(centre, pose[:2], atol=1.0)
+
+
+def test_of_a_hand_that_throws_a_ball_the_ball_comes_first():
+    """It is seen from when it leaves the hand, by its colour: it is as bright as what is behind."""
+    frames, ball = throw()
+    first, *others = find_movers(lambda: iter(frames), 40)
+    assert first.flies and not any(other.flies for other in others)
+    assert RELEASE <= first.first_frame < RELEASE + 5
+    np.testing.assert_allclose(first.point_px, ball[first.first_frame], atol=1)
