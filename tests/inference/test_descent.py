@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
-from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
+from galileo_jax.inference.fits.residuals import Batch, Sides, Slopes, cost
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.starts import scattered_starts
 from tests.oracle_trials import make_trials
@@ -34,7 +34,7 @@ class Banana:
         z = motions[0][0]
         return [np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)]
 
-    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool, motions=None) -> Slopes:
+    def slopes(self, points: Batch, steps: np.ndarray, sides: Sides, motions=None) -> Slopes:
         z = points.z
         [white] = self.whites_of(points, motions or self.motions(points))
         jacobian = np.zeros((len(z), 2, 3))
@@ -50,7 +50,7 @@ def batch(*z, free: np.ndarray | bool = True):
 
 def descend(points, enough=1e-9, max_steps=200, give_up=None):
     banana: Any = Banana()
-    descent = Descent(banana, np.ones(3), is_smooth=True, is_central=False)
+    descent = Descent(banana, np.ones(3), is_smooth=True, sides="ahead")
     return descent(points, enough, max_steps, give_up)
 
 
@@ -87,7 +87,7 @@ def test_slopes_are_taken_only_where_a_step_has_got_somewhere(monkeypatch):
         return slopes(points, *rest)
 
     monkeypatch.setattr(residuals, "slopes", watched)
-    descent = Descent(residuals, np.ones(3), is_smooth=True, is_central=False)  # pyright: ignore
+    descent = Descent(residuals, np.ones(3), is_smooth=True, sides="ahead")  # pyright: ignore
     count = FEW + 1  # of fewer all are
     found = descent(batch(*[[-1.2, 1.0, 0.0]] * count), 1e-9, 200)
     assert all(np.diff(costs) < 0) and len(costs) < found.num_steps

@@ -39,7 +39,7 @@ class Known:
     def costs(self, points):
         return cost(self.whites(points), points.z)
 
-    def slopes(self, points, steps, is_central):
+    def slopes(self, points, steps, sides):
         moved = (points.z[:, None] + s * np.eye(2) for s in (STEP, -STEP))
         ahead, behind = (np.stack(self.white(*np.moveaxis(z, 2, 0)), axis=1) for z in moved)
         index = np.tile(np.arange(2), (len(points.z), 1))

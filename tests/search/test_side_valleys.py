@@ -7,10 +7,11 @@ import pytest
 from scipy.special import ndtr
 
 import galileo_jax as gx
+from benchmarks.side_valleys import draw_scene, from_truth
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fit_posterior import laplace_posterior
+from galileo_jax.inference.fit_posterior import fit_posterior, laplace_posterior
 from galileo_jax.inference.fits.descent import ends_of, in_valley, valleys
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
@@ -60,6 +61,19 @@ def test_a_fit_leaves_a_side_valley(tmp_path, settings, seed):
     assert value["k1"] == pytest.approx(truth["k1"], abs=FRICTION_OFF)
     assert value["k2"] == pytest.approx(truth["k2"], abs=FRICTION_OFF)
     assert value["m1"] / value["m2"] == pytest.approx(truth["m1"] / truth["m2"], rel=RATIO_OFF)
+
+
+@pytest.mark.parametrize(("seed", "name"), [(730046, "start_offset_object2"), (730093, "k1")])
+def test_a_fit_beside_a_wall_has_the_evidence_of_its_open_side(seed, name):
+    """A hit just before the foot; a disc that just rolls: 3 and 5 nats and a narrow interval."""
+    scene = draw_scene(seed)
+    fitter = GradientFitter(scene.trials)
+    found = best_fit(fitter, 0)
+    assert from_truth(scene, fitter).log_evidence - found.log_evidence < 1.0
+    i = scene.trials.names.index(name)
+    assert np.sqrt(found.covariance[i, i]) > 0.1
+    draws = fit_posterior(scene.trials, found, 0)
+    assert np.quantile(draws["k1"], 0.975) > 0.2
 
 
 def test_a_fit_looks_at_hits_that_hardly_rebound(tmp_path):

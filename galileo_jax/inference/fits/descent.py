@@ -21,6 +21,7 @@ from galileo_jax.inference.fits.residuals import (
     Batch,
     Motions,
     Residuals,
+    Sides,
     Slopes,
     cost,
     quadratic,
@@ -141,14 +142,14 @@ class Descent:
       residuals: of the trials.
       coarse_steps: `[model parameter]`, as `JointProblem.coarse_steps`.
       is_smooth: whether motion is smooth at every scale: slopes are then taken over small steps.
-      is_central: whether differences are taken to both sides. Forward ones cost half and lead to
-        within some hundredths of a standard deviation of the mode.
+      sides: of differences. Those ahead cost half and lead to within some hundredths of a standard
+        deviation of the mode.
     """
 
     residuals: Residuals
     coarse_steps: np.ndarray
     is_smooth: bool
-    is_central: bool
+    sides: Sides
 
     def __call__(
         self, points: Batch, enough: float, max_steps: int, give_up: GiveUp | None = None
@@ -210,7 +211,7 @@ class Descent:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
         if self.is_smooth:
             widths = np.tile(SMALLEST_STEP * self.coarse_steps, (len(points.z), 1))
-        return self.residuals.slopes(points, widths, self.is_central, motions)
+        return self.residuals.slopes(points, widths, self.sides, motions)
 
     def half_sd(self, slopes: Slopes) -> np.ndarray:
         """Difference steps in z: half a conditional sd, within what slopes are good for.

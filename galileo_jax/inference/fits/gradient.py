@@ -33,7 +33,7 @@ from galileo_jax.inference.fits.descent import (
 from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
 from galileo_jax.inference.fits.laplace import laplace_fits, points_of
-from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.fits.residuals import Batch, Residuals, Sides
 from galileo_jax.inference.joint_problem import (
     NOISE_SCALE_RANGE,
     JointProblem,
@@ -80,9 +80,9 @@ class GradientFitter:
         self.is_smooth = trials.problems[0].engine.name == "rigid"
         self._count = len(trials.model_parameters)
 
-    def _descent(self, is_central: bool = False) -> Descent:
-        is_central |= not self.is_smooth
-        return Descent(self.residuals, self.trials.coarse_steps, self.is_smooth, is_central)
+    def _descent(self, sides: Sides = "ahead") -> Descent:
+        sides = sides if self.is_smooth else "both"
+        return Descent(self.residuals, self.trials.coarse_steps, self.is_smooth, sides)
 
     def compile(self, with_races: bool = False) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes.
@@ -193,7 +193,7 @@ class GradientFitter:
         fit = _with_beside(found)
         if not self.is_smooth or fit.code is not Code.CONVERGED:
             return fit
-        points, descent = points_of((fit, *fit.beside)), self._descent(is_central=True)
+        points, descent = points_of((fit, *fit.beside)), self._descent("both")
         owner = np.arange(len(points.z))
         modes = polish(descent, points, owner, STILL_NATS, MOST_POLISH_STEPS, drift=STILL)
         still = laplace_fits(self.trials, self.residuals, modes)

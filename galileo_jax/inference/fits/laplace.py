@@ -96,7 +96,7 @@ def laplace_fits(trials: JointProblem, residuals: Residuals, found: Polished) ->
 
     `found`: the modes.
     """
-    slopes = residuals.slopes(found.points, found.widths, is_central=True)
+    slopes = residuals.slopes(found.points, found.widths, sides="open")
     normal = quadratic(slopes, found.points.z).normal
     slopes = slopes._replace(jacobian=[slopes.among_all(j, axis=2) for j in slopes.jacobian])
     return [_laplace_fit(trials, residuals, found, slopes, own, i) for i, own in enumerate(normal)]

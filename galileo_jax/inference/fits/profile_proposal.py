@@ -103,7 +103,7 @@ def ridge_along(fit: GradientFit, valley: Valley, residuals: Residuals) -> Ridge
     def look(u: np.ndarray) -> Quadratic:
         z = fit.z[:count] + u @ root.T
         steps = np.tile(fit.steps, (len(z), 1))
-        slopes = residuals.slopes(fit.points(z), steps, is_central=True)
+        slopes = residuals.slopes(fit.points(z), steps, sides="open")
         found = quadratic(slopes, z)
         return Quadratic(u, found.cost, found.gradient @ root, root.T @ found.normal @ root)
 

@@ -1,7 +1,7 @@
 """Whitened residuals of many hypotheses' points, and their slopes, by batches of rollouts."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -17,6 +17,9 @@ from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 
 Motions = list[tuple[np.ndarray, ...]]
 """For each clip parameters in their units, and centres and velocities `[point, ...]`."""
+
+Sides = Literal["ahead", "both", "open"]
+"""Of differences: forward; the mean of both sides; both sides, as far as each is open (`_open`)."""
 
 POINTS = (4, 16)  # sizes of compiled batches of hypotheses
 FREE = 4  # numbers of free parameters are rounded up to multiples
@@ -96,15 +99,14 @@ class Residuals:
         self,
         points: Batch,
         steps: np.ndarray,
-        is_central: bool,
+        sides: Sides,
         motions: Motions | None = None,
     ) -> Slopes:
         """By differences, where the motion changes; in parameters of clock and camera by JAX.
 
-        `steps`: `[point, model parameter]`, in z. `is_central`: differences to both sides, not
-        forward ones. `motions`: of the points, where they are known.
+        `steps`: `[point, model parameter]`, in z. `motions`: of the points, where they are known.
         """
-        index, sides = _free_index(points.free), (1, -1) if is_central else (1,)
+        index, signs = _free_index(points.free), (1,) if sides == "ahead" else (1, -1)
         jacobians, whites = [], []
         for c, motion in enumerate(motions or self.motions(points)):
             white, jacobian = self._seen_slopes(c, points, index, motion)
@@ -113,14 +115,13 @@ class Residuals:
             point, slot = np.nonzero(moves[index])
             which = index[point, slot]
             step, rows = steps[point, which], np.arange(len(point))
-            mean = np.zeros((len(point), white.shape[1]))
-            aside = [points.take(point) for _ in sides]
-            for batch, side in zip(aside, sides, strict=True):
-                batch.z[rows, which] += side * step
+            aside = [points.take(point) for _ in signs]
+            for batch, sign in zip(aside, signs, strict=True):
+                batch.z[rows, which] += sign * step
             moved = self._whites(c, Batch(*map(np.concatenate, zip(*aside, strict=True))))
-            for own, side in zip(np.split(moved, len(sides)), sides, strict=True):
-                mean += (own - white[point]) / (side * step[:, None]) / len(sides)
-            jacobian[point, :, slot] = mean
+            each = np.stack(np.split(moved, len(signs))) - white[point]
+            each /= np.multiply.outer(signs, step)[..., None]
+            jacobian[point, :, slot] = _open(each) if sides == "open" else each.mean(axis=0)
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
@@ -150,6 +151,17 @@ class Residuals:
         self.num_rollouts += len(points.z)
         theta = clip.theta(points.z, points.free)
         return clip.problem.of_motions(theta, _white(clip), points.noise[:, c])
+
+
+def _open(each: Float[np.ndarray, "side row value"]) -> Float[np.ndarray, "row value"]:
+    """The slope from those to either side, in proportion to the variance 1 / (1 + J^T J) of each.
+
+    At a mode beside a wall (a disc that would slip, a hit that would come before the foot) the
+    posterior lies on the other side, and a mean would take it for as narrow as the wall is steep.
+    Where motion is smooth it is the mean.
+    """
+    variance = 1.0 / (1.0 + np.sum(each**2, axis=-1, keepdims=True))
+    return np.sum(variance * each, axis=0) / variance.sum(axis=0)
 
 
 def _white(clip: FittedClip) -> Callable[..., Any]:

@@ -107,7 +107,7 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     root[own, :size] = axes[:size, :size] * np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
     # Noise scales, behind the others, hardly depend on these.
     root[count:, size:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
-    slopes = residuals.slopes(fit.points(fit.z[None]), fit.steps[None], is_central=True)
+    slopes = residuals.slopes(fit.points(fit.z[None]), fit.steps[None], sides="open")
     jacobian = np.concatenate([slopes.among_all(clip, axis=2)[0] for clip in slopes.jacobian])
     step = REACH * np.eye(size)
     z = np.tile(fit.z, (1 + 2 * size, 1))
