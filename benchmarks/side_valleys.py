@@ -45,7 +45,7 @@ RELEASES_M, GAPS_M, NOISES_M = (0.15, 0.8), (0.005, 0.6), (5e-5, 1e-3)
 FPS = 30.0
 AFTER_REST_S, LONGEST_S = 0.3, 3.0
 SIDE_VALLEY_NATS = 3.0
-BAR = 0.003
+BAR = 0.002
 
 
 @in_float64
