@@ -69,7 +69,7 @@ def test_every_start_of_a_batch_arrives_at_the_end_of_a_curved_valley():
     np.testing.assert_allclose(found.best.z[:, :2], np.tile(best.x, (3, 1)), atol=1e-4)
     np.testing.assert_allclose(found.best.z[:, 2], 0.0, atol=1e-4)
     np.testing.assert_allclose(found.best.cost, best.cost, atol=1e-8)
-    white = Banana().slopes(points, np.ones(3), False).white
+    white = Banana().slopes(points, np.ones(3), "ahead").white
     np.testing.assert_allclose(found.first_cost, cost(white, points.z))
 
 
