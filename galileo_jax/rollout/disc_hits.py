@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from galileo_jax.model.effects.effect import Rims, Walls
 from galileo_jax.rollout.events import PLASTIC_M_S, newton, reaches_s
@@ -279,15 +279,33 @@ def bounce_times_s(discs: Discs, a: jax.Array, left_s: jax.Array, table: Table) 
 
     if table.walls is None:
         return jnp.zeros((0, len(table.radius_m)))
-    return jnp.stack([one(ends) for ends in table.walls.ends_m])
+    return jax.vmap(one)(jnp.asarray(table.walls.ends_m))
 
 
-def after_bounce(
-    discs: Discs, speed_m_s: jax.Array, wall: int, table: Table
+def after_bounces(
+    discs: Discs, bounces: Bool[jax.Array, "wall object"], table: Table
 ) -> tuple[jax.Array, jax.Array]:
+    """Places and speeds `[object, 3]` after bounces off the walls, one wall after the other."""
+    if table.walls is None:
+        return discs.place_m, discs.speed_m_s
+
+    def one(discs: Discs, at: tuple[jax.Array, jax.Array]) -> tuple[Discs, None]:
+        ends_m, strikes = at
+        place, speed = _after_bounce(discs, ends_m, table)
+        strikes = strikes[:, None]
+        place = jnp.where(strikes, place, discs.place_m)
+        speed = jnp.where(strikes, speed, discs.speed_m_s)
+        return discs._replace(place_m=place, speed_m_s=speed), None
+
+    after, _ = jax.lax.scan(one, discs, (jnp.asarray(table.walls.ends_m), bounces))
+    return after.place_m, after.speed_m_s
+
+
+def _after_bounce(discs: Discs, ends_m: jax.Array, table: Table) -> tuple[jax.Array, jax.Array]:
     """Places and speeds `[object, 3]` of all discs, were they to strike a wall here."""
     assert table.walls is not None
-    gap, normal, reach, side = _at_wall(discs, table.walls.ends_m[wall], table)
+    speed_m_s = discs.speed_m_s
+    gap, normal, reach, side = _at_wall(discs, ends_m, table)
     # What was pressed into the wall within the step, by a thousandth of a millimetre, comes back.
     into = jnp.maximum(-gap, 0.0)
     across = jnp.stack([-normal[:, 1], normal[:, 0]], axis=1)

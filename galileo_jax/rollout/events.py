@@ -226,8 +226,8 @@ def newton(
       most: the last time at which the level may be asked for.
       steps: of the search.
     """
-    low, high, left = jnp.zeros_like(at), jnp.full_like(at, jnp.inf), jnp.zeros_like(at)
-    for _ in range(steps):
+
+    def nearer(at: jax.Array, low: jax.Array, high: jax.Array) -> tuple[jax.Array, ...]:
         at = jax.lax.stop_gradient(jnp.clip(at, 0.0, most))
         left, rate = level(at)
         rate = jax.lax.stop_gradient(rate)
@@ -235,7 +235,14 @@ def newton(
         high = jnp.where(left > 0, high, at)
         new = at - left / jnp.where(rate < 0, rate, -1.0)
         is_inside = (rate < 0) & (new >= low) & (new <= high)
-        at = jnp.where(is_inside, new, 0.5 * (low + high))
+        return jnp.where(is_inside, new, 0.5 * (low + high)), low, high, left
+
+    def early(_: Any, carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
+        return jax.lax.stop_gradient(nearer(*carry)[:3])
+
+    bounds = jnp.zeros_like(at), jnp.full_like(at, jnp.inf)
+    begin = jax.lax.stop_gradient((at, *bounds))
+    at, _, _, left = nearer(*jax.lax.fori_loop(0, steps - 1, early, begin))
     return at, left
 
 

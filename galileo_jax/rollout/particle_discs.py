@@ -19,7 +19,7 @@ from galileo_jax.rollout.disc_hits import (
     ROOT2,
     Discs,
     Table,
-    after_bounce,
+    after_bounces,
     after_hit,
     bounce_times_s,
     hit_times_s,
@@ -77,13 +77,10 @@ class DiscSystem(System):
         soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits, bounces.ravel()])))
         t = jnp.where(is_last, left_s, soonest)
         moved = discs.after(a, t)
-        place, speed = moved.place_m, jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
+        speed = jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
         for k, pair in enumerate(pairs):
             speed = jnp.where(hits[k] <= t, after_hit(moved, speed, pair, table), speed)
-        for wall, bounce in enumerate(bounces):
-            back, bounced = after_bounce(moved._replace(place_m=place), speed, wall, table)
-            place = jnp.where((bounce <= t)[:, None], back, place)
-            speed = jnp.where((bounce <= t)[:, None], bounced, speed)
+        place, speed = after_bounces(moved._replace(speed_m_s=speed), bounces <= t, table)
         return moved._replace(place_m=place, speed_m_s=speed), t
 
     def _acceleration(self, discs: Discs, time_s: jax.Array) -> jax.Array:

@@ -21,6 +21,7 @@ DT_S = 1 / 240
 G = 9.81
 EXACT = 1e-9  # m and m/s, in 64 bit
 ROLL_OUT = jax.jit(roll_out, static_argnums=(0, 1, 2, 3))
+LONGEST_S = 1.5
 FINE_M = 2e-4  # of the solver's steps of 0.1 ms
 
 
@@ -28,11 +29,17 @@ def truth(seed: int = 0, **values: float) -> PlaneTruth:
     return draw_level(np.random.default_rng(seed), values)
 
 
-def rolled(one: PlaneTruth, seconds: float, names=None, theta=None):
-    names = tuple(one.values) if names is None else names
-    theta = jnp.asarray([one.values[name] for name in names]) if theta is None else theta
-    records = round(seconds / DT_S) + 1
-    return ROLL_OUT((*one.effects, *LAWS), names, records, DT_S, theta, one.surroundings)
+def rolled_in_jax(one: PlaneTruth, seconds: float, theta: jax.Array):
+    """All tests roll out as long, and share programs; what is later than `seconds` is cut off."""
+    names, records = tuple(one.values), round(max(seconds, LONGEST_S) / DT_S) + 1
+    found = ROLL_OUT((*one.effects, *LAWS), names, records, DT_S, theta, one.surroundings)
+    return tuple(each[..., : round(seconds / DT_S) + 1] for each in found)
+
+
+def rolled(one: PlaneTruth, seconds: float):
+    """Places and speeds `[object, 3, record]`."""
+    theta = jnp.asarray(list(one.values.values()))
+    return tuple(np.asarray(each) for each in rolled_in_jax(one, seconds, theta))
 
 
 def alone(**values: float) -> PlaneTruth:
@@ -350,7 +357,7 @@ def test_slopes_agree_with_differences(seed: int, has_walls: bool, is_oval: bool
     theta = np.array([one.values[name] for name in names])
 
     def at_end(values: jax.Array) -> jax.Array:
-        return rolled(one, 1.0, names, values)[0][..., ::12]
+        return rolled_in_jax(one, 1.0, values)[0][..., ::12]
 
     slopes = np.asarray(jax.jacfwd(at_end)(jnp.asarray(theta)))
     steps = np.array(1e-6 * np.maximum(np.abs(theta), 0.01))
