@@ -64,8 +64,13 @@ def track_video(
     done = iter(finished(fits, flat, shares, coding, clock[:count], len(starts) == 1))
     objects = [joined([next(done) for _ in own], count) for own in first.pieces]
     if len(objects) == 1 and needs_silhouette(objects[0], starts[0]):
-        # Those of two objects that touch are one, whose middle is neither's.
-        objects = [with_silhouette(objects[0], starts[0], paths_of(open_frames, clock), clock)]
+        # Those of two objects that touch are one, whose middle is neither's. In grey, if that will
+        # do: coders keep colours at half the resolution.
+        for view in (lambda: map(grey, open_frames()), open_frames):
+            found = with_silhouette(objects[0], starts[0], paths_of(view, clock), clock)
+            if found is not objects[0]:
+                objects = [found]
+                break
     stacked = {name: np.stack([getattr(item, name) for item in objects]) for name in FIELDS}
     return Track(
         names=tuple(start.name for start in starts),
