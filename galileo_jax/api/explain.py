@@ -17,9 +17,10 @@ from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
-from galileo_jax.api.track import TrackLike
+from galileo_jax.api.track import TrackLike, tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
@@ -50,6 +51,8 @@ class Explanation:
       command: the command that does the same.
       could_not_see: where nothing is missing, of each effect the smallest strength that would have
         shown; as in diagnosis.json, which has it where there is one.
+      gravity: where nothing is missing and nothing carries the objects, the acceleration of free
+        fall that the motion itself shows, as an entry of result.json; empty where it shows none.
       files: that were written.
     """
 
@@ -58,6 +61,7 @@ class Explanation:
     diagnosis: Diagnosis | None
     command: str
     could_not_see: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    gravity: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
 
     @cached_property
@@ -80,9 +84,9 @@ class Explanation:
 
     @property
     def check_document(self) -> dict[str, Any]:
-        """compare.json: the check's, and where nothing is missing what could not have been seen."""
-        seen = {"could_not_see": self.could_not_see} if self.could_not_see else {}
-        return {**self.check.document, **seen}
+        """compare.json: the check's, and where nothing is missing `could_not_see` and `gravity`."""
+        more = {"could_not_see": self.could_not_see, "gravity": self.gravity}
+        return {**self.check.document, **{name: one for name, one in more.items() if one}}
 
     @in_float64
     def report(self, path: str | Path, beside: Mapping[str, str] | None = None) -> tuple[Path, ...]:
@@ -317,11 +321,24 @@ def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanatio
     with progress.part(COMPARED, 0.95):
         if check.is_adequate:
             progress.report("what could not have been seen", 0.0)
-            return replace(found, could_not_see=_could_not_see(check, engine, seed))
+            found = replace(found, could_not_see=_could_not_see(check, engine, seed))
+            return replace(found, gravity=_gravity(first, engine, seed))
         progress.report("asking what is missing", 0.0, found)
         missing = diagnose_fitted(first, engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
         return replace(found, fit=missing.best, diagnosis=missing)
+
+
+def _gravity(fit: Fit, engine: str, seed: int) -> dict[str, Any]:
+    """What a fit says of gravity where that is free; empty where it tells nothing."""
+    clip = fit.measurements[0].clip
+    scenario = SCENARIOS[clip.scenario]
+    if scenario.has_ramp or scenario.is_level or not clip.is_scale_known:
+        return {}
+    progress.report("what gravity it shows", 0.7)
+    free = fit_tracks(tracks_of(fit.measurements), free="gravity", engine=engine, seed=seed)
+    entry = free.parameters["gravity"]
+    return dict(entry) if entry["identified"] else {}
 
 
 def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[str, Any]]:

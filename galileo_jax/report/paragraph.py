@@ -57,6 +57,7 @@ def paragraph(
         _verdict(result, check, diagnosis),
         "" if status == "law" else _values(effects),  # the law's text has them
         f"All values are those with {_all(result)}." if is_one_of_several else "",
+        _gravity(check),
         _unseen(check, diagnosis),
     ]
     return " ".join(filter(None, said))
@@ -142,6 +143,13 @@ def _verdict(
         return f"The data contradict the model ({p})."
     text = f"What it leaves looks like noise: nothing is missing ({p})."
     return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
+
+
+def _gravity(check: Mapping[str, Any]) -> str:
+    entry = check.get("gravity")
+    if entry is None:
+        return ""
+    return f"Gravity, measured instead of taken as declared, is {_value(entry)}."
 
 
 def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:

@@ -134,6 +134,18 @@ def test_an_answer_goes_before_the_yaml_but_objects_are_not_declared_twice(board
         gx.explain(board, point=(10.0, 20.0))
 
 
+def test_a_fall_shows_gravity_and_a_slope_does_not(plain, tmp_path):
+    path = tmp_path / "fall.csv"
+    gx.simulate(path, scenario="fall", seed=1, track_only=True)
+    found = gx.explain(path)
+    assert found.diagnosis is None
+    seen = found.gravity
+    assert seen["q025"] < 9.81 < seen["q975"] and 0 < seen["sd"] < 0.1
+    assert "Gravity, measured instead of taken as declared, is 9." in found.paragraph
+    assert found.check_document["gravity"] == seen
+    assert plain.gravity == {} and "Gravity" not in plain.paragraph
+
+
 @pytest.mark.slow
 def test_a_hidden_drag_is_named_and_its_strength_told(tmp_path):
     path = tmp_path / "drag.csv"
