@@ -106,7 +106,7 @@ def _with_points(
         found_at = {"point_px": mover.point_px, "first_frame": mover.first_frame}
         marked = item.model_copy(update=found_at)
         outline = outline_of(clip, marked)
-        if outline.size_px is not None and not outline.is_round and mover.num_features:
+        if outline.size_px is not None and mover.num_features:
             centre = fit_outline(first, mover.places_px, outline)
             marked = marked.model_copy(update={"point_px": centre})
         found[item.name] = marked
@@ -124,13 +124,13 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
     match item.shape:
         case "box":
             return Outline((radius * scale, others[-1] * scale), angle)
-        case "cylinder" if not SCENARIOS[clip.scenario].is_level:
+        case "cylinder" if not (SCENARIOS[clip.scenario].is_level or item.rolls):
             side = min(2 * radius, others[0])
         case "torus":
-            side = 2 * others[0]
-        case _:  # a sphere, or a puck, which lies flat and is seen from above
+            side = 2 * (sum(item.size_m) if item.rolls else others[0])
+        case _:  # a sphere, a puck, which lies flat and is seen from above, or what rolls
             side = 2 * radius
-    # A cylinder or torus may lie or stand: the disc that fits into it either way.
+    # Another cylinder or torus may lie or stand: the disc that fits into it either way.
     return Outline((side * scale, side * scale), angle, is_round=True)
 
 

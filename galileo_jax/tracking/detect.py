@@ -34,6 +34,7 @@ LOOK_AHEAD_FRAMES = 3
 MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03  # share of the frame's width within which a thing counts as at the border
+RIM_POINTS = 64  # at which a disc's edge is looked at
 LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked by chance
 STRAY, LEAST_WAY = 0.03, 3.0
 """Of its way, by which what flies is off a parabola in time, and by more of which that is bent; how
@@ -258,11 +259,12 @@ def _middle(places: np.ndarray, angle_rad: float) -> tuple[float, float]:
 
 
 def fit_outline(image: np.ndarray, places: np.ndarray, outline: Outline) -> tuple[float, float]:
-    """The centre of the rectangle of known size that holds `places` and has the sharpest sides.
+    """The centre of the rectangle or disc of known size that holds `places` and has sharp sides.
 
-    Features on one side of an object may be missing (something touched it as it set out), so
-    the middle of those found can be several pixels off. The rectangle is shifted, along its own
-    axes, as far as the features let it, to where the grey image changes most across its sides.
+    Features on one side of an object may be missing (something touched it as it set out, or what
+    rolls turns them away), so the middle of those found can be several pixels off. The outline is
+    shifted, along its own axes, as far as the features let it, to where the grey image changes most
+    across its sides.
     """
     assert outline.size_px is not None
     size = np.array(outline.size_px)
@@ -276,7 +278,13 @@ def fit_outline(image: np.ndarray, places: np.ndarray, outline: Outline) -> tupl
     patch = cv2.GaussianBlur(patch, (0, 0), 0.8)
     across = np.abs(cv2.Sobel(patch, cv2.CV_32F, 1, 0)), np.abs(cv2.Sobel(patch, cv2.CV_32F, 0, 1))
 
+    around = np.linspace(0, 2 * np.pi, RIM_POINTS, endpoint=False)
+    rim = np.stack([np.cos(around), np.sin(around)])
+
     def sharpness(shift: np.ndarray) -> float:
+        if outline.is_round:
+            x, y = np.round(radius + shift[:, None] + rim * size[:, None] / 2).astype(int)
+            return float((across[0][y, x] * abs(rim[0]) + across[1][y, x] * abs(rim[1])).mean())
         left, top = np.round(radius + shift - size / 2).astype(int)
         right, bottom = np.round(radius + shift + size / 2).astype(int)
         sides = [across[0][top:bottom, x] for x in (left, right)]

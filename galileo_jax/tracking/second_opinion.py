@@ -1,6 +1,7 @@
 """Where the texture of an object loses it: the path of its silhouette instead."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -77,6 +78,8 @@ def with_silhouette(
     place[[not start.uses(index) for index in range(len(place))]] = np.nan
     shown = np.isfinite(place[:, 0])
     both = shown & seen
+    if _turns(found, start):
+        found = _at_the_middle(found, place, both)
     apart = found.position_px[both] - place[both]
     middle = np.median(apart, axis=0) if both.any() else np.zeros(2)
     size = float(np.median(path.sizes_px))
@@ -107,6 +110,27 @@ def with_silhouette(
     shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
     none = np.tile(nothing[:, None, None], (1, 2, 2))
     return Finished(place, covariance + none, none, shifts_px, nothing)
+
+
+def _at_the_middle(
+    found: Finished, place: Float[np.ndarray, "frame 2"], both: Bool[np.ndarray, " frame"]
+) -> Finished:
+    """The track of the middle of what turns, by that of a point that goes round it.
+
+        point = middle + R(angle) d,    middle = silhouette's + c
+
+    where d and c, one each, leave less than SAME_PX; else as it was found.
+    """
+    if both.sum() < SAME_FRAMES:
+        return found
+    c, s = np.cos(found.angle_rad), np.sin(found.angle_rad)
+    one, none = np.ones_like(c), np.zeros_like(c)
+    design = np.stack([np.stack([c, -s, one, none], -1), np.stack([s, c, none, one], -1)], 1)
+    apart = (found.position_px - place)[both].reshape(-1)
+    fit = least_squares(design[both].reshape(-1, 4), apart)
+    if np.median(np.abs(fit.left)) > SAME_PX:
+        return found
+    return replace(found, position_px=found.position_px - design[..., :2] @ fit.solution[:2])
 
 
 def _led_on(

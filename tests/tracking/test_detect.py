@@ -85,3 +85,14 @@ def test_of_a_hand_that_throws_a_ball_the_ball_comes_first():
     assert first.flies and not any(other.flies for other in others)
     assert RELEASE <= first.first_frame < RELEASE + 5
     np.testing.assert_allclose(first.point_px, ball[first.first_frame], atol=1)
+
+
+def test_a_disc_is_moved_to_its_edge():
+    """What rolls turns features away from one half of it, and has more inside."""
+    row, column = np.indices((120, 160))
+    far = np.hypot(column - 80.4, row - 60.2)
+    image = np.where(far < 26, 200.0, 90.0)
+    image[(far < 26) & (column > 84) & (abs(row - 60) < 12)] = 60.0
+    places = np.array([[84.0, 49.0], [104.0, 70.0], [84.0, 71.0], [103.0, 50.0]])
+    centre = fit_outline(image.astype(np.uint8), places, Outline((52.0, 52.0), is_round=True))
+    np.testing.assert_allclose(centre, [80.4, 60.2], atol=1.0)

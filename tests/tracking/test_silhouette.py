@@ -177,3 +177,20 @@ def test_a_silhouette_to_which_no_path_leads_is_followed_alone():
     start = Start("ball", (106.0, 80.0), Outline(None))
     track = with_silhouette(found, start, [path], np.arange(50.0))
     assert (np.flatnonzero(np.isfinite(track.angle_rad)) == path.frames).all()
+
+
+def test_a_mark_that_goes_round_tells_the_middle():
+    """Its path is as smooth as the silhouette's, whose scatter is larger."""
+    time = np.arange(50.0)
+    angle, middle = 0.004 * time**2, np.stack([20 + 0.1 * time**2, 40 + 0.02 * time**2], axis=1)
+    mark = middle + 3.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    seen = middle + np.random.default_rng(3).normal(0, 0.15, middle.shape) + [0.4, 0.0]
+    path = Path([], [], [])
+    for index, place in enumerate(seen):
+        path.append(index, float(index), Part(place, 400.0, place - 10, place + 10))
+    square = np.zeros((50, 2, 2))
+    found = Finished(mark, square + 1e-3 * np.eye(2), square, np.zeros((50, 6, 2, 2)), angle)
+    start = Start("disc", (23.0, 40.0), Outline((22.0, 22.0), is_round=True))
+    track = with_silhouette(found, start, [path], time)
+    off = track.position_px - middle
+    np.testing.assert_allclose(off, np.broadcast_to(off.mean(axis=0), off.shape), atol=0.12)
