@@ -9,8 +9,9 @@ REPEATED, NEAR_FRAMES = 0.2, 5
 """A picture repeats the one before if it differs from it by less than this share of what pictures
 differ by shortly before and after; a motion that begins or ends changes on one side."""
 LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
-"""Fewer, or less of the pictures in which something moves, are chance (the turn of a swing); 24 a
-second stored as 30 repeat one in five."""
+"""Fewer, or less of the pictures in which something moves, may be the turn of a swing; 24 a second
+stored as 30 repeat one in five."""
+SUDDEN = 0.6  # of what a picture changes by: those before a repeat are alike, those after no less
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
 FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
 AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
@@ -70,7 +71,7 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
     is_moving = least > LEAST_CHANGE_GREY
     is_repeat = is_moving & (change < REPEATED * least)
     if is_repeat.sum() < max(LEAST_REPEATS, REPEATED_SHARE * is_moving.sum()):
-        return np.zeros(count, bool)
+        return is_repeat & _is_sudden(change, is_repeat)
     fresh = np.flatnonzero(is_moving & ~is_repeat)
     apart = np.diff(fresh)
     period = int(apart.min()) if len(apart) else 1
@@ -78,6 +79,23 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
         is_repeat = np.arange(count) % period != fresh[0] % period
         is_repeat[0] = False
     return is_repeat
+
+
+def _is_sudden(
+    change: Float[np.ndarray, " picture"], is_repeat: Bool[np.ndarray, " picture"]
+) -> Bool[np.ndarray, " picture"]:
+    """Whether pictures right before a run of repeats change by much and alike, and those after.
+
+    At the turn of a swing they change less and less, and then more and more.
+    """
+    found, fresh = np.zeros(len(change), bool), np.flatnonzero(~is_repeat)
+    for index in np.flatnonzero(is_repeat):
+        at = int(np.searchsorted(fresh, index))
+        before, after = change[fresh[max(at - 2, 0) : at]], change[fresh[at : at + 2]]
+        least = max(SUDDEN * before.max(initial=0.0), change[index] / REPEATED, LEAST_CHANGE_GREY)
+        is_whole = len(before) == len(after) == 2
+        found[index] = is_whole and min(before.min(), after.min() / SUDDEN) > least
+    return found
 
 
 def is_blank(contrast: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:

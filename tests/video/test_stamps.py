@@ -49,9 +49,13 @@ def test_repeats_of_pictures() -> None:
     # 24 pictures a second as 30: one in five repeats.
     fifths = changes(*[60, 65, 1, 70, 70] * 4)
     assert np.flatnonzero(repeats(fifths)).tolist() == [3, 8, 13, 18]
+    # A camera that froze, for two pictures and for one.
+    frozen = changes(*[1.0] * 8, 60, 64, 66, 70, 1, 2, 200, 75, 78, 80, 82, 0.5, 170, 88, 90, 92)
+    assert np.flatnonzero(repeats(frozen)).tolist() == [13, 14, 20]
     # A slow beginning, a turn of a swing, a rest: nothing repeats.
     assert not repeats(changes(*np.linspace(0.1, 90, 40))).any()
-    assert not repeats(changes(*np.abs(np.linspace(-80, 80, 41)))).any()
+    for turn in (np.linspace(-80, 80, 41), np.linspace(-80, 80, 17)):
+        assert not repeats(changes(*np.abs(turn))).any()
     assert not repeats(changes(*[80.0] * 10, *[0.5] * 30, *[80.0] * 10)).any()
     assert not repeats(changes(*[2.0, 0.1] * 20)).any()  # noise
 
