@@ -41,9 +41,14 @@ def needs_silhouette(found: Finished, start: Start) -> bool:
     if start.corrections:
         return False  # somebody has looked at it
     seen = np.isfinite(found.angle_rad)
-    wanted = np.array([start.uses(index) for index in range(len(seen))])
-    is_lost = (wanted & ~seen).sum() > LOST_SHARE * wanted.sum()
-    return bool(is_lost or _turns(found, start) or _stays(found, seen))
+    return is_lost(found, start) or _turns(found, start) or _stays(found, seen)
+
+
+def is_lost(found: Finished, start: Start) -> bool:
+    """Whether an object is missed in many of the frames in which it is looked for."""
+    wanted = np.array([start.uses(index) for index in range(len(found.angle_rad))])
+    missed = wanted & ~np.isfinite(found.angle_rad)
+    return bool(missed.sum() > LOST_SHARE * wanted.sum())
 
 
 def _stays(found: Finished, seen: Bool[np.ndarray, " frame"]) -> bool:

@@ -13,7 +13,7 @@ from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
-from galileo_jax.tracking.second_opinion import needs_silhouette, with_silhouette
+from galileo_jax.tracking.second_opinion import is_lost, needs_silhouette, with_silhouette
 from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
@@ -64,13 +64,8 @@ def track_video(
     done = iter(finished(fits, flat, shares, coding, clock[:count], len(starts) == 1))
     objects = [joined([next(done) for _ in own], count) for own in first.pieces]
     if len(objects) == 1 and needs_silhouette(objects[0], starts[0]):
-        # Those of two objects that touch are one, whose middle is neither's. In grey, if that will
-        # do: coders keep colours at half the resolution.
-        for view in (lambda: map(grey, open_frames()), open_frames):
-            found = with_silhouette(objects[0], starts[0], paths_of(view, clock), clock)
-            if found is not objects[0]:
-                objects = [found]
-                break
+        # Those of two objects that touch are one, whose middle is neither's.
+        objects = [_second_look(objects[0], starts[0], open_frames, clock)]
     stacked = {name: np.stack([getattr(item, name) for item in objects]) for name in FIELDS}
     return Track(
         names=tuple(start.name for start in starts),
@@ -79,6 +74,20 @@ def track_video(
         frame_size_px=first.size_px,
         **stacked,
     )
+
+
+def _second_look(
+    found: Finished,
+    start: Start,
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    clock: np.ndarray,
+) -> Finished:
+    """The track with silhouettes: in grey if these do, as coders keep colours half as finely."""
+    best = with_silhouette(found, start, paths_of(lambda: map(grey, open_frames()), clock), clock)
+    if best is not found and not is_lost(best, start):
+        return best
+    other = with_silhouette(found, start, paths_of(open_frames, clock), clock)
+    return max(best, other, key=lambda one: np.isfinite(one.angle_rad).sum())
 
 
 @dataclass

@@ -113,6 +113,22 @@ def test_the_middle_of_what_turns_is_followed_not_its_mark():
     assert np.abs(off[seen] - np.median(off[seen], axis=0)).max() < 2 * SPREAD_PX
 
 
+def test_what_only_its_colour_shows_in_half_of_the_film_is_followed_through_all_of_it():
+    """A green ball before a wall that is darker on the left and as bright on the right."""
+    bright = np.interp(np.arange(SIZE_PX[1]), [0, 160, 319], [40, 128, 128])
+    wall = np.repeat(np.tile(bright, (SIZE_PX[0], 1))[..., None], 3, axis=2)
+    path = np.stack([20 + 9.0 * np.arange(31), 80 + 0.0 * np.arange(31)], axis=1)
+    frames = []
+    for at, rng in zip(path, np.random.default_rng(0).spawn(31), strict=True):
+        frame = np.round(wall + rng.normal(0, 2.0, wall.shape[:2])[..., None]).astype(np.uint8)
+        cv2.circle(frame, tuple(map(int, at)), 9, (40, 170, 80), -1, cv2.LINE_AA)
+        frames.append(frame)
+    track = tracked(frames, path[0])
+    seen = track.is_visible[0]
+    assert seen.mean() > 0.9
+    assert np.hypot(*(track.position_px[0] - path)[seen].T).max() < 1.5
+
+
 def test_a_moving_camera_has_no_silhouettes():
     places = [np.array([[30.0 + 4 * i, 60.0]]) for i in range(20)]
     frames = [picture(at, camera=9.0 * i, contrast=70, seed=i) for i, at in enumerate(places)]
