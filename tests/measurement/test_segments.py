@@ -193,6 +193,17 @@ def test_slow_motion_within_a_film_is_named(tmp_path):
     assert found.time_s == pytest.approx(24 / 60, abs=3 / 60)
 
 
+def test_slow_motion_soon_after_a_release_is_named(tmp_path):
+    """It was at rest in the frames before, and the jump of its clock looks like a blow as well."""
+    clip = load_clip(write_clip(tmp_path, "fall"))
+    clock = np.cumsum(np.repeat([1 / 60, 1 / 240], [26, 60]))
+    fallen = 4.905 * np.maximum(clock - 13 / 60, 0) ** 2
+    observed = seen(np.stack([0 * clock, 2 - fallen]), np.arange(86) / 60, 3e-4, seed=3)
+    (found,) = segment(clip, observed).cuts
+    assert "goes on 0.2" in found.why and "the frame rate changes there" in found.why
+    assert found.time_s == pytest.approx(25 / 60, abs=1.5 / 60)
+
+
 def test_a_blow_is_no_change_of_the_rate(tmp_path):
     clip = load_clip(write_clip(tmp_path, "flight"))
     (found,) = segment(clip, flight_with_clock(np.arange(60) / 60, bounce=-5.0)).cuts

@@ -27,14 +27,27 @@ def rate_change(observation: Observation) -> tuple[int, float] | None:
     """
     path, found = observation.path(), []
     for at in range(FEWEST, len(path) - FEWEST - SMEARED + 1):
-        sides = path[max(at - FRAMES, 0) : at], path[at + SMEARED : at + SMEARED + FRAMES]
         middle_s = (path.times_s[at - 1] + path.times_s[at]) / 2
-        before, after = (_parabola(side, middle_s) for side in sides)
+        starts, ends = _reaches(at, -1), _reaches(at + SMEARED, 1)
+        first, before = _longest([(max(n, 0), path[max(n, 0) : at]) for n in starts], middle_s)
+        last, after = _longest([(n, path[at + SMEARED : n]) for n in ends], middle_s)
         if max(before.left, after.left) < MOST_LEFT and (factor := _factor(before, after)):
-            both = path[max(at - FRAMES, 0) : at + SMEARED + FRAMES]
+            both = path[first:last]
             if not _kinked_left(both, float(np.median(path.variance_m2))) < MOST_LEFT:
                 found.append((before.left + after.left, int(path.frames[at - 1]), factor))
     return min(found)[1:] if found else None
+
+
+def _reaches(at: int, way: int) -> list[int]:
+    """To where a side may reach: all the way, or not to where it is at rest or struck."""
+    return [at + way * FRAMES, at + way * FEWEST]
+
+
+def _longest(sides: list[tuple[int, PointPath]], middle_s: float) -> tuple[int, "_Parabola"]:
+    """Where the first side ends of which a parabola leaves noise alone, or the last; and that."""
+    found = ((end, _parabola(side, middle_s)) for end, side in sides[:-1])
+    good = next(((end, one) for end, one in found if one.left < MOST_LEFT), None)
+    return good or (sides[-1][0], _parabola(sides[-1][1], middle_s))
 
 
 class _Parabola(NamedTuple):

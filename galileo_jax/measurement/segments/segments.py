@@ -166,6 +166,10 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         kept = kept.begin_at(first, PLACED).end_with(None if last is None else (last, 0, TAKEN))
     if clip.scenario in SWINGS:
         kept = kept.begin_at(handling.let_go_frame(kept.observation), IS_HELD)
+    if (scenario.has_ramp or is_free) and (change := rate_change(kept.observation)) is not None:
+        # Before other ends are looked for: a clock that changes looks like a blow.
+        last = change[0] - (EXPOSED_FRAMES if kept.observation.is_tracked_here else 0)
+        kept = kept.end_with((last, 0, CHANGES_RATE.format(change[1])))
     kept = kept.end_with(_end_of_one(clip, kept.observation))
     if scenario.has_ramp and scenario.angle_deg == 0:
         return kept.begin_at(handling.pushed_frame(kept.observation), PUSHED)
@@ -191,8 +195,6 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int, int, str] | 
         is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
         find = blow.bounce_frame if is_in_space else blow.blow_frame
         ends.append((find(observation), STRUCK))
-    if (is_board or is_free) and (change := rate_change(observation)) is not None:
-        ends.append((change[0], CHANGES_RATE.format(change[1])))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:
         return None
