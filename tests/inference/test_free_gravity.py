@@ -181,7 +181,10 @@ def test_confounded(told, has_surface, names, words):
     assert reason is None if words is None else words in str(reason)
 
 
-@pytest.mark.parametrize("engine", ["c", "mjx"])
+@pytest.mark.parametrize(
+    "engine",
+    ["c", pytest.param("mjx", marks=pytest.mark.slow)],  # half a minute, and the fields of c
+)
 def test_engines_agree_on_another_gravity(engine, tmp_path):
     trials = trials_of(ramp(tmp_path))
     model = trials.problems[0].model
