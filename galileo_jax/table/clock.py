@@ -16,7 +16,7 @@ from galileo_jax.table.numbers import Numbers, Rows, is_nothing
 CLOCK = re.compile(r"(?:(\d{1,4}):)?(\d{1,4}):(\d{1,2})(?:[.,](\d+))?")
 FIELDS = re.compile(r"(\d{1,3}):(\d{1,2}):(\d{1,2})[:;](\d{1,3})")
 DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(:\d{2}([.,]\d+)?)?\s?(Z|[+-]\d{2}:?\d{2})?")
-DAY = re.compile(r"(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*([\d:.,]+)\s*([AaPp]\.?[Mm]\.?)?")
+DAY = re.compile(r"(?:(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*)?([\d:.,]+)\s*([AaPp]\.?[Mm]\.?)?")
 """Another date than `DATE`, its day, clock, and half of the day: 14.05.2024 09:31:02,033."""
 
 SAME_RATE = 0.1
@@ -37,7 +37,8 @@ def clock_times(rows: Rows, title: str, at: int, fps: float | None) -> Numbers |
     """
     cells = [(line, row[at] if at < len(row) else "") for line, row in rows]
     first = next((cell for _, cell in cells if not is_nothing(cell)), "")
-    if DATE.fullmatch(first) is None and DAY.fullmatch(first):
+    is_plain = any(one.fullmatch(first) for one in (FIELDS, CLOCK, DATE))
+    if is_time(first) and not is_plain:
         cells = [
             (line, _clock_of_day(cell, first, f"line {line}: {title}")) for line, cell in cells
         ]

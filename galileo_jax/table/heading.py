@@ -72,6 +72,8 @@ def split_heading(rows: Rows) -> Heading:
     commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
     above = [(line, _uncommented(row)) for line, row in rows[:start]]
     body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
+    while not _has_number(body[-1][1]):  # words below the table
+        body.pop()
     counts = [_num_titles(row) for _, row in above]
     if not any(counts):
         above += _marker_titles(above)

@@ -4,6 +4,7 @@ bytes -> text -> grid of cells -> titles, units, names -> roles of columns -> nu
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -139,24 +140,28 @@ def _clock(columns: Columns, lines: Sequence[int]) -> tuple[np.ndarray | None, f
     written = columns.meanings[found[0]].unit
     if written is not None and written not in SECONDS:
         raise InputError(f"{title}: a time in {written}; s, ms or us expected")
-    per_unit = SECONDS[written] if written else 1.0
-    if written is None:
-        per_unit = next((each for least, each in UNIX[::-1] if values[0] > least), 1.0)
+    per_unit = _per_unit(columns, found[0])
     if abs(values[0]) * per_unit > 1e6:  # a date: what is left of its digits begins at 0
         values = values - values[0]
     return values * per_unit, columns.numbers[found[0]].resolution * per_unit
 
 
+def _per_unit(columns: Columns, n: int) -> float:
+    """Seconds in a unit of a column of times."""
+    written, first = columns.meanings[n].unit, columns.numbers[n].values[0]
+    if written is not None:
+        return SECONDS.get(written, math.nan)
+    return next((each for least, each in UNIX[::-1] if first > least), 1.0)
+
+
 def _check_one_clock(columns: Columns) -> None:
     """Refuses columns of time that go by at different rates: motions beside each other."""
     clocks = {n: columns.numbers[n] for n in columns.of("time")}
-    gone = {n: float(np.ptp(one.seen)) * SECONDS.get(columns.meanings[n].unit or "s", math.nan)
+    gone = {n: float(np.ptp(one.seen)) * _per_unit(columns, n)
             for n, one in clocks.items() if one.steps.size and one.steps.min() > 0}  # fmt: skip
+    first = next(iter(gone), -1)
     for n in gone:
-        first = next(iter(gone))
-        if columns.meanings[n].name != columns.meanings[first].name and (
-            abs(gone[n] - gone[first]) > SAME_CLOCK * gone[first]
-        ):
+        if abs(gone[n] - gone[first]) > SAME_CLOCK * gone[first]:
             raise InputError(
                 f"{columns.name_of(first)!r} and {columns.name_of(n)!r} are two clocks; a table "
                 "for each expected"
@@ -200,6 +205,10 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
     for role in PLACES:
         for n in columns.of(role):
             of = by_name.setdefault(columns.meanings[n].name, {})
+            exact = [at for at in (of.get(role), n) if at is not None and _is_exact(columns, at)]
+            if role in of and len(exact) == 1:  # beside y a height is another thing's, or a box's
+                of[role] = exact[0]
+                continue
             if role in of:
                 raise InputError(
                     f"{columns.name_of(of[role])!r} and {columns.name_of(n)!r}: {role} is "
@@ -213,6 +222,12 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
             of.pop("line", None)
             of.pop("angle", None)
     return by_name
+
+
+def _is_exact(columns: Columns, n: int) -> bool:
+    """Whether a column's title is its axis alone, with its unit or without."""
+    words = re.split(r"[\s(\[/,]", columns.heading.titles[n].lower())
+    return words[0] == columns.meanings[n].role
 
 
 def _unit(columns: Columns) -> str | None:

@@ -112,6 +112,11 @@ FORMS = {
         lambda n: f"5/14/2024 9:31:0{n * 40 // 1000}.{n * 40 % 1000:03d} AM")),
     "two_clocks_that_agree": text("t1 (s),x,y,t2 (ms)", body=[
         f"{one},{1000 * n * STEP_S + 7:.0f}" for n, one in enumerate(lines())]),
+    "a_clock_of_twelve_hours": text("time;x;y", body=clocked(
+        lambda n: f"9:31:0{n * 40 // 1000}.{n * 40 % 1000:03d} PM")),
+    "words_below": text("\tt\tx\ty", body=[f"\t{one}" for one in lines("\t")],
+                        after=("", "End of data")),
+    "boxes": text("t,x,y,w,h", body=[f"{one},18,19" for one in lines()]),
     "a_time_twice": text("t,x,y", body=[lines()[0], *lines()]),
 }  # fmt: skip
 
@@ -218,6 +223,8 @@ def test_two_clocks_in_one_table_are_refused(tmp_path: Path) -> None:
     body = [f"{t},{y},{2 * t},{y}" for t, _, y in truth().T]
     with pytest.raises(InputError, match="'t1' and 't2' are two clocks"):
         read(tmp_path, text("t1,y1,t2,y2", body=body))
+    with pytest.raises(InputError, match="are two clocks"):
+        read(tmp_path, text("Time (s) Run #1,y Run #1,Time (s) Run #2,y Run #2", body=body))
 
 
 def test_a_row_for_each_particle(tmp_path: Path) -> None:
