@@ -1,18 +1,21 @@
 """The errors of what rests: smaller than in motion, and they follow each other from frame to frame.
 
 Sampling and coding shift what moves from frame to frame, and what stands still once; a coder
-repeats what does not change, and with it its error, until the next whole frame. The tracker states
-one error for all. Quiet frames, of which most clips have many, would make a fit trust the moving
-ones too much, and errors that follow each other look like a small slow motion of a thing that
-nothing moves. So each coordinate of each rest is described as
+repeats what does not change, and with it its error, until it codes it again: then the error is
+drawn anew, and may be many times what is stated of a frozen picture. The tracker states one error
+for all. Quiet frames, of which most clips have many, would make a fit trust the moving ones too
+much, and errors that follow each other look like a small slow motion of a thing that nothing moves.
+So each coordinate of each rest is described as
 
-    measured = place + error,    error ~ v sd^2 ((1 - w) 1 + w K),    K = exp(-|frames| / tau),
+    measured = place + error,    error ~ v sd^2 (.99 K + .01 1),    K = exp(-|frames| / tau),
 
-sd as stated, frames: how far they are apart; and given the covariance that follows, averaged over w
-and tau by the likelihood with the place and v left open. v is never less than what the clip's rests
-have on average: one that scatters less by chance, or because the coder froze it, is no better
-known. What has come to rest is besides off by one shift of all its frames: however many there are,
-they do not average it out.
+sd as stated, frames: how far they are apart. K is the covariance of a constant that is drawn anew,
+at random, every tau frames; tau = 0: independent errors. The rest is given the covariance that
+follows, averaged over tau by the likelihood with the place and v left open, v about what the clip's
+rests have on average, as if one window more had shown it. Beside those that last each frame has an
+error of LEAST_SCALE of the stated one or more: a picture that a coder froze is no better known.
+What has come to rest is besides off by one shift of all its frames: however many there are, they do
+not average it out.
 
 Source: Patterson and Thompson (1971), Recovery of inter-block information when block sizes are
 unequal, Biometrika 58, 545 (the likelihood of covariances, without the mean).
@@ -26,30 +29,28 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri, logsumexp
 
-from galileo_jax.observation.observation import Observation, stretches
+from galileo_jax.observation.observation import AWAY_M, Observation, stretches
 from galileo_jax.observation.random_patterns import random_patterns
 from galileo_jax.tracking.noise import SETTLES_FRAMES
 
 WINDOW = 9  # frames
 STILL_SDS = 5.0  # of the stated noise: whoever goes no further in a window is at rest in it
-# Of a rest's frames beside a motion so many may hold its slow end: errors are not learnt from them.
-BESIDE = WINDOW // 2
+BESIDE = WINDOW // 2  # of a rest's last frames so many may hold the slow begin of a motion
 # What slows down to a stop goes as far in its last frames as noise does, and a coder that leaves a
 # picture as it is shows it where it was: errors were 3 times, once 15 times, those of a rest.
 SETTLES = WINDOW // 2 + SETTLES_FRAMES
 MIN_WINDOWS = 20  # fewer do not tell a variance
 LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
-MOST_VARIANCE = 4.0  # of what rests of the clip have: more is a motion
-PIECE = 48  # frames whose likelihood is computed together
-SHARES = np.array([0.3, 0.5, 0.7, 0.85, 0.95])
-TAUS = np.array([1.0, 1.5, 2.5, 4.0, 7.0])  # frames
+PIECE = 120  # frames whose likelihood is computed together
+FRESH = 0.01  # of errors that last so much is another from frame to frame
+TAUS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # frames
 # Of the variance in motion, less what scatters at rest: what has come to rest is coded again, frame
 # after frame, until hardly anything is left: 0.16 and 0.34 of it (x, y; object 2 in 120 rendered
 # clips that were looked at, MPEG-4), 0.41 and 0.51 (10 in H.264), 0.06 and 0.34 (10 in H.265).
 SHIFT_SHARE = 0.4
 FAINT = 0.1  # of the independent errors: a weaker pattern of errors is left out
 Kinds = Float[np.ndarray, " kind"]
-"""One for independent errors, then one for each share and, of it, each tau."""
+"""One for independent errors, then one for each tau."""
 
 
 def with_errors_at_rest(observation: Observation) -> Observation:
@@ -68,7 +69,7 @@ def with_errors_at_rest(observation: Observation) -> Observation:
             continue
         for rest, axis in product(rests, range(observation.position_m.shape[1])):
             sd = np.sqrt(observation.covariance_m2[i, axis, axis, rest])
-            alone, together = _errors(observation.position_m[i, axis], sd, rest, usual)
+            alone, together = _errors(observation.position_m[i, axis, rest], sd, usual)
             covariance[i, axis, :, rest] *= np.sqrt(alone)
             covariance[i, :, axis, rest] *= np.sqrt(alone)
             least = FAINT * alone / max(np.linalg.eigvalsh(together)[-1], 1e-300)
@@ -105,50 +106,53 @@ def _shifts(
 def _look(observation: Observation, i: int) -> tuple[list[slice], Float[np.ndarray, " window"]]:
     """When object `i` rests, and in each axis of each window in which it does its scatter.
 
-    The scatter is the sum of squares about the window's mean in units of the stated variance. Of
+    The scatter is the sum of squares about the window's mean in units of the stated variance. What
+    is coded anew in the middle of a window may go as far as errors do, and rests nevertheless. Of
     rests that follow a motion without the first frames: there it comes to rest.
     """
     mask, windows = observation.mask[i], np.lib.stride_tricks.sliding_window_view
     if len(mask) < WINDOW:
         return [], np.zeros(0)
-    place = windows(observation.position_m[i], WINDOW, axis=-1)
-    variance = windows(np.diagonal(observation.covariance_m2[i]).T, WINDOW, axis=-1)
-    white = (place - place.mean(axis=-1, keepdims=True)) / np.sqrt(variance)
-    away = np.nan_to_num(np.abs(white).max(axis=(0, 2)), nan=np.inf)
-    still = windows(mask, WINDOW).all(axis=-1) & (away < STILL_SDS)
+    seen = windows(mask, WINDOW).all(axis=-1)
+    sd = windows(np.sqrt(np.diagonal(observation.covariance_m2[i]).T), WINDOW, axis=-1)
+    far = np.maximum(STILL_SDS * sd[:, seen].max(axis=(1, 2), initial=0.0), AWAY_M)[:, None]
+    step = np.diff(observation.position_m[i])
+    inner = windows(step, WINDOW - 1, axis=-1).copy()
+    middle = inner[..., WINDOW // 2 - 1 : WINDOW // 2 + 1]
+    middle[np.abs(middle) < far[..., None]] = 0.0
+    path = np.cumsum(np.pad(inner, ((0, 0), (0, 0), (1, 0))), axis=-1)
+    white = (path - path.mean(axis=-1, keepdims=True)) / sd
+    still = seen & (np.nan_to_num(np.abs(white).max(axis=(0, 2)), nan=np.inf) < STILL_SDS)
+    is_rest = np.convolve(still, np.ones(WINDOW)) > 0
+    is_rest[1:] &= ~(np.abs(step) > far).any(axis=0)  # it has moved, within a frame
     rests = [
-        slice(rest.start + (SETTLES if rest.start else 0), rest.stop)
-        for rest in stretches(np.convolve(still, np.ones(WINDOW)) > 0)
+        slice(
+            rest.start + (SETTLES if rest.start else 0),
+            rest.stop - (BESIDE if rest.stop < len(mask) else 0),
+        )
+        for rest in stretches(is_rest)
     ]
     return [r for r in rests if r.start < r.stop], (white[:, still] ** 2).sum(axis=-1).reshape(-1)
 
 
 def _errors(
-    place_m: Float[np.ndarray, " frame"], sd_m: Float[np.ndarray, " row"], rest: slice, usual: float
-) -> tuple[float, Float[np.ndarray, "row row"]]:
-    """The variance of independent errors and the covariance of others, over the stated ones.
+    place_m: Float[np.ndarray, " frame"], sd_m: Float[np.ndarray, " frame"], usual: float
+) -> tuple[float, Float[np.ndarray, "frame frame"]]:
+    """The variance of independent errors and the covariance of those that last, over the stated.
 
-    Of a coordinate of the whole clip, of which `sd_m` and `rest` are of one rest; `usual` is the
-    variance of what rests in this clip over the stated one.
+    Of a coordinate of one rest; `usual` is the variance of what rests in this clip over the stated.
     """
-    first = rest.start + (BESIDE if rest.start else 0)
-    after = rest.stop - (BESIDE if rest.stop < len(place_m) else 0)
-    if after - first < WINDOW:  # too few are surely at rest to tell
-        return usual, np.zeros((len(sd_m), len(sd_m)))
-    count = max(1, round((after - first) / PIECE))
-    pieces = np.array_split(np.arange(first, after), count)
-    parts = [_likelihood(place_m[own], sd_m[own - rest.start]) for own in pieces]
+    pieces = np.array_split(np.arange(len(sd_m)), max(1, round(len(sd_m) / PIECE)))
+    parts = [_likelihood(place_m[own], sd_m[own]) for own in pieces]
     determinant, square = (np.sum(each, axis=0) for each in zip(*parts, strict=True))
-    degrees = after - first - count
-    # Independent errors are as probable beforehand as all others together.
-    prior = np.append(0.0, np.full(len(square) - 1, -np.log(len(square) - 1)))
-    evidence = prior - (determinant + degrees * np.log(np.maximum(square, 1e-300))) / 2
-    probability = np.exp(evidence - logsumexp(evidence))
-    variance = np.clip(square / (degrees - 2), usual, MOST_VARIANCE * usual)
-    weight = probability * variance
-    shares = np.append(0.0, np.repeat(SHARES, len(TAUS)))
-    of_tau = (weight * shares)[1:].reshape(len(SHARES), len(TAUS)).sum(axis=0)
-    return float(weight @ (1 - shares)), np.einsum("k,kab->ab", of_tau, _kernels(len(sd_m)))
+    square += (WINDOW - 1) * usual
+    degrees = len(sd_m) - len(pieces) + WINDOW - 1
+    evidence = -(determinant + degrees * np.log(square)) / 2
+    weight = np.exp(evidence - logsumexp(evidence)) * square / (degrees - 2)
+    lasting = (1 - FRESH) * np.einsum("k,kab->ab", weight[1:], _kernels(len(sd_m)))
+    alone = float(weight[0] + FRESH * weight[1:].sum())
+    # Not among the independent ones: how large those are in motion a frozen picture does not tell.
+    return alone, lasting + max(LEAST_SCALE**2 - alone, 0.0) * np.eye(len(sd_m))
 
 
 def _likelihood(
@@ -156,8 +160,7 @@ def _likelihood(
 ) -> tuple[Kinds, Kinds]:
     """Of a piece without its place: log-determinant and sum of squares, for v = 1."""
     size = len(place_m)
-    kernels = _kernels(size)
-    covers = [(1 - w) * np.eye(size) + w * kernel for w in SHARES for kernel in kernels]
+    covers = FRESH * np.eye(size) + (1 - FRESH) * _kernels(size)
     root = np.linalg.cholesky(np.array([np.eye(size), *covers]))
     both = np.linalg.solve(root, np.column_stack([1 / sd_m, (place_m - place_m.mean()) / sd_m]))
     still, white = both[..., 0], both[..., 1]

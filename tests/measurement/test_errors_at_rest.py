@@ -147,3 +147,46 @@ def test_a_slow_start_is_no_error_of_the_rest():
     assert np.median(np.diag(found)[:50]) == pytest.approx(
         np.median(np.diag(without)[:50]), rel=0.2
     )
+
+
+REPEATED_SD_M, CODED_EVERY = SD_M / 20, 12  # stated of a frozen picture; frames
+
+
+def frozen(seed, jump_m=0.0, frames=120):
+    """A body at rest that a coder repeats, and now and then codes anew, with errors of SD_M.
+
+    Half way it goes so far besides.
+    """
+    rng, still = np.random.default_rng(seed), at_rest_all_the_time(0.0, seed, frames)
+    coded = SD_M / 2 * rng.standard_normal((1, 2, frames // CODED_EVERY))
+    errors = np.repeat(coded, CODED_EVERY, axis=-1)
+    errors += 0.1 * REPEATED_SD_M * rng.standard_normal((1, 2, frames))
+    gone = np.where(np.arange(frames) < frames // 2, 0.0, jump_m)
+    covariance = still.covariance_m2 * (REPEATED_SD_M / SD_M) ** 2
+    return replace(still, position_m=0.2 + errors + gone, covariance_m2=covariance)
+
+
+def test_what_is_coded_anew_is_off_anew():
+    """However small the error that is stated of a picture that is repeated."""
+    off, squares, alike, least = [], [], [], 0.99 * (LEAST_SCALE * REPEATED_SD_M / SD_M) ** 2
+    for seed in range(20):
+        seen = with_errors_at_rest(frozen(seed))
+        for axis in range(2):
+            cover = covariance_of(seen, axis)
+            errors = (seen.position_m[0, axis] - 0.2) / SD_M
+            assert np.linalg.eigvalsh(cover)[0] > least, (
+                "no frame is better known by its neighbours"
+            )
+            off.append(errors.mean() / np.sqrt(cover.mean()))
+            white = np.linalg.solve(np.linalg.cholesky(cover), errors)
+            squares.append(np.mean(white**2))
+            alike.append(np.mean(white[1:] * white[:-1]))
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.2
+    assert 0.7 < np.mean(squares) < 1.1
+    assert np.mean(alike) == pytest.approx(0.0, abs=0.2)
+
+
+def test_what_moves_within_a_frame_has_moved():
+    """By more than a picture that is coded anew is off: that is no error, however quick it was."""
+    cover = covariance_of(with_errors_at_rest(frozen(3, jump_m=50 * SD_M)), 0)
+    assert np.sqrt(np.diag(cover).max()) < 2
