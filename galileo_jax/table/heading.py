@@ -167,7 +167,7 @@ def _is_body(row: list[str], words: set[int]) -> bool:
 
 
 def _uncommented(row: list[str]) -> list[str]:
-    first = COMMENT.sub("", row[0], count=1)
+    first = row[0][match.end() :] if (match := COMMENT.match(row[0])) else row[0]
     return row[1:] if not first and row[0] else [first, *row[1:]]
 
 
