@@ -79,12 +79,14 @@ def facing(apart_m: Float[jax.Array, " 2"], one: Rim, other: Rim) -> tuple[jax.A
     """
     distance = jnp.sqrt(jnp.sum(apart_m**2))
     straight = jnp.arctan2(apart_m[1], apart_m[0])
-    beside = jnp.zeros_like(straight)
-    for _ in range(FACING_STEPS):
+
+    def nearer(_: int, beside: jax.Array) -> jax.Array:
         rims = [rim.reach_m(straight + beside) for rim in (one, other)]
         slope, bend = (sum(rim[k] for rim in rims) for k in (1, 2))
         off = distance * jnp.sin(beside) + slope
-        beside = beside - off / (distance * jnp.cos(beside) + bend)
+        return beside - off / (distance * jnp.cos(beside) + bend)
+
+    beside = jax.lax.fori_loop(0, FACING_STEPS, nearer, jnp.zeros_like(straight))
     direction = straight + beside
     reach = one.reach_m(direction)[0] + other.reach_m(direction)[0]
     return direction, distance * jnp.cos(beside) - reach
