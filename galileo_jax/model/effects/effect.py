@@ -121,6 +121,7 @@ class Surroundings:
       walls_m: `[wall, end, 2]`, on a table that is seen from above: the declared walls' ends.
       half_depth_m, beside_m: `[object]`, of boxes that move freely: half the extent across the
         travel, and how far the centre is from the plane, towards the camera; empty: of others.
+      way_m: how far object 1 is seen to go; 0: nothing was seen yet.
     """
 
     names: tuple[str, ...]
@@ -147,6 +148,7 @@ class Surroundings:
     walls_m: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
     half_depth_m: tuple[float, ...] = ()
     beside_m: tuple[float, ...] = ()
+    way_m: float = 0.0
 
     @property
     def is_level(self) -> bool:

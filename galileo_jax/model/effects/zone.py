@@ -20,10 +20,10 @@ def zone_parameters(name: str, scene: Surroundings) -> tuple[Parameter, ...]:
     """`NAME_start`, `NAME_length` and `NAME_edge`, m; without a strength they mean nothing.
 
     The start may be anywhere from object 1's own to somewhat past the foot (without one, to
-    half a metre on).
+    half a metre on, or as far as it is seen to go).
     """
     low = scene.start_path_m[0]
-    high = PAST_FOOT_M if scene.comes_down[0] else low + WITHOUT_FOOT_M
+    high = PAST_FOOT_M if scene.comes_down[0] else low + max(WITHOUT_FOOT_M, scene.way_m)
     middle, long, edge = (low + high) / 2, LENGTH_PRIOR.median, EDGE_PRIOR.median
     return (
         Parameter(f"{name}_start", "m", Uniform(low, high), middle, "effect", 0.1),

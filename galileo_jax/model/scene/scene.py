@@ -162,6 +162,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         laws=laws_of(clip),
         expected=expected(clip, observation, half[0][int(not scenario.is_level)]),
         walls_m=tuple(wall.ends_m for wall in clip.walls),
+        way_m=float(np.hypot(*np.ptp(observation.position_m[0, :2, observation.mask[0]], axis=0))),
     )
     return Scene(surroundings, clip.objects)
 

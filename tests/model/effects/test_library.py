@@ -28,6 +28,7 @@ from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_theta
 
 SCENES = {"pair": PAIR, "one": ONE, "incline": INCLINE}
+LONG = replace(INCLINE, way_m=1.2)
 NO_PLACE = {
     "pair": set(),
     "one": {"restitution"},
@@ -81,13 +82,13 @@ def test_parameters(name):
     assert inverse((strength, *others), theta) == pytest.approx(np.asarray(z), abs=1e-9)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_zones_cover_the_path(scene):
+@pytest.mark.parametrize(("scene", "end"), [(PAIR, 0.3), (ONE, 0.3), (INCLINE, 0.5), (LONG, 1.2)])
+def test_zones_cover_the_path(scene, end):
     for name in ("friction_patch", "magnetic_brake"):
-        _, start, *_ = make_effects([name])[0].parameters(SCENES[scene])
+        _, start, *_ = make_effects([name])[0].parameters(scene)
         low, high = (float(start.prior.forward(jnp.asarray(z))) for z in (-6.0, 6.0))
-        assert low == pytest.approx(SCENES[scene].start_path_m[0], abs=1e-6)
-        assert high == pytest.approx(0.3 if scene != "incline" else 0.5, abs=1e-6)
+        assert low == pytest.approx(scene.start_path_m[0], abs=1e-6)
+        assert high == pytest.approx(end, abs=1e-6)
 
 
 @pytest.fixture(scope="module")

@@ -109,6 +109,12 @@ def test_paths_are_the_places_along_ramp_and_table(angle, tmp_path):
     assert velocity == pytest.approx(np.array([[cos, -sin], [1.0, 0.0]]))
 
 
+def test_the_way_is_as_far_as_object_1_is_seen_to_go(tmp_path):
+    run = np.linspace(0, 0.8, 5) * np.array([[0.6], [-0.8]])
+    declared = clip(tmp_path, scenario="incline", shapes=("box",))
+    assert build_scene(declared, observed(run[None])).surroundings.way_m == pytest.approx(0.8)
+
+
 def test_sizes_and_gravity_reach_the_model(tmp_path):
     times = np.array([0.0])
     centres = solve(HIT, times).position_m
