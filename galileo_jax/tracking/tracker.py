@@ -87,6 +87,8 @@ def _second_look(
     if best is not found and not is_lost(best, start):
         return best
     other = with_silhouette(found, start, paths_of(open_frames, clock), clock)
+    if best is found:
+        return other
     return max(best, other, key=lambda one: np.isfinite(one.angle_rad).sum())
 
 
