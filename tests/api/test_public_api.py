@@ -3,6 +3,7 @@
 import json
 import threading
 import types
+from collections.abc import Mapping
 from pathlib import Path
 
 import jax
@@ -37,7 +38,7 @@ def drag(folder) -> Path:
 
 
 @pytest.fixture(scope="module")
-def alone(drag) -> dict[int, dict]:
+def alone(drag) -> dict[int, Mapping]:
     """By seed, what a fit of the track says that nothing else runs beside."""
     return {seed: gx.fit(drag, seed=seed).parameters for seed in (0, 1)}
 
