@@ -65,8 +65,10 @@ def with_silhouette(
     one, but for what is round, whose middle it becomes. Otherwise it becomes the silhouette's
     middle. If a smooth path leads to that from where the texture was last seen (it was held until
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
-    they are apart is then an unknown shift of the silhouette. Of a texture that hardly moves while
-    a silhouette sets out from it, the first frame alone counts: it is of the scene behind.
+    they are apart is then an unknown shift of the silhouette. Where the two go together, and now
+    nearer, now farther apart, that is an error of the silhouette, too. Of a texture that hardly
+    moves while a silhouette sets out from it, the first frame alone counts: it is of the scene
+    behind.
     """
     seen = np.isfinite(found.angle_rad)
     if _stays(found, seen):
@@ -104,6 +106,9 @@ def with_silhouette(
         kept[last + 1 :] = False
         if kept.any():
             slow_px = float(np.hypot(slow_px, ON_OBJECT * size))
+        ways = [way_px(one[both]) for one in (place, found.position_px)] if both.any() else [0.0]
+        if min(ways) > size > np.ptp(ways):  # they go together, and nobody knows which is off
+            slow_px = float(np.hypot(slow_px, 1.4826 * scatter))
     covariance = np.where(kept[:, None, None], found.covariance_px2, _covariance(place, clock))
     if start.outline.is_round or not is_fixed:
         place = np.where(kept[:, None], found.position_px - middle, place)

@@ -195,6 +195,22 @@ def test_a_silhouette_to_which_no_path_leads_is_followed_alone():
     assert (np.flatnonzero(np.isfinite(track.angle_rad)) == path.frames).all()
 
 
+def test_a_silhouette_that_goes_to_and_fro_about_the_texture_is_no_better_known_than_that():
+    time = np.arange(50.0)
+    middle = np.stack([20 + 0.1 * time**2, np.full(50, 40.0)], axis=1)
+    texture = np.where(time[:, None] < 35, middle, np.nan)
+    path = Path([], [], [])
+    for index, place in enumerate(middle + 3.0 * np.sin(time[:, None] / 4)):
+        path.append(index, float(index), Part(place, 400.0, place - 10, place + 10))
+    none = np.where(np.isfinite(texture[:, 0]), 0.0, np.nan)
+    square = none[:, None, None] + np.zeros((50, 2, 2))
+    found = Finished(texture, square + 1e-3 * np.eye(2), square, square, none)
+    start = Start("ball", (20.0, 40.0), Outline((20.0, 20.0)))
+    track = with_silhouette(found, start, [path], time)
+    assert np.isfinite(track.angle_rad).all()
+    assert (track.shifts_px[:, 0, 0] > 2.0).all(), "rms of what it is off by: 2.1 px"
+
+
 def test_a_mark_that_goes_round_tells_the_middle():
     """Its path is as smooth as the silhouette's, whose scatter is larger."""
     time = np.arange(50.0)
