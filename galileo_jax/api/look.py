@@ -2,13 +2,18 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from galileo_jax.clip.look import Seen, seen_in_table
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import PLACES, read_table
 from galileo_jax.table.track_table import TrackTable
+
+if TYPE_CHECKING:
+    from galileo_jax.api.understand import Understood
 
 
 @dataclass(frozen=True)
@@ -31,16 +36,32 @@ class Look:
     table: TrackTable | None = None
     fps: float | None = None
 
+    @cached_property
+    def understood(self) -> "Understood":
+        """What moves and how; a film is looked through for it, which takes some seconds."""
+        from galileo_jax.api.understand import understand
+
+        return understand(self.path)
+
     @property
     def yaml(self) -> str:
-        """The clip's yaml that would be written; "" of a film."""
-        return self.seen.yaml if self.seen else ""
+        """The clip's yaml that would be written; "" of a film in which nothing is understood."""
+        if self.seen is not None:
+            return self.seen.yaml
+        from galileo_jax.api.proposed_clip import yaml_of
+
+        return yaml_of(self.understood, {}) if self.understood.scenario({}) else ""
 
     def summary(self) -> str:
         """Lines to read: columns, time, gaps, what moves, the likely scenario; a yaml."""
-        if self.seen is None:
-            return f"{self.path.name}: {self.film}"
-        return "\n".join(_lines(self.seen))
+        lines = _of_table(self.seen) if self.seen is not None else _of_film(self)
+        beside = self.path.with_suffix(".yaml")
+        if beside.exists():
+            return "\n".join([*lines, f"declared: {beside.name}, which is there already"])
+        if not self.yaml:
+            return "\n".join(lines)
+        written = ["  " + line for line in self.yaml.splitlines()]
+        return "\n".join([*lines, "", f"{beside.name} would be:", "", *written])
 
     def plot(self, path: str | Path) -> Path:
         """Writes the places in time as a figure, by the path's suffix (png, svg, pdf).
@@ -51,9 +72,9 @@ class Look:
           InputError: the picture cannot be written.
         """
         if self.seen is None or self.table is None:
-            from galileo_jax.api.understand import understand, write_marks
+            from galileo_jax.api.understand import write_marks
 
-            return write_marks(understand(self.path), path)
+            return write_marks(self.understood, path)
         from galileo_jax.report.draw import write_picture
         from galileo_jax.report.track_chart import look_chart
 
@@ -87,7 +108,15 @@ def look(file: str | Path, *, fps: float | None = None) -> Look:
     return Look(path, None, film, info.warnings, fps=info.fps)
 
 
-def _lines(seen: Seen) -> list[str]:
+def _of_film(film: Look) -> list[str]:
+    from galileo_jax.api.understand import listed_things, sentence_of
+
+    known = film.understood
+    lines = [f"{film.path.name}: {film.film}", sentence_of(known, {})]
+    return [*lines, *(f"  {one}" for one in listed_things(known))]
+
+
+def _of_table(seen: Seen) -> list[str]:
     rows = [("column", "role", "unit", "last digit")]
     for one in seen.columns:
         is_used = bool(one.role) and (one.role not in PLACES or one.role in seen.axes)
@@ -110,9 +139,4 @@ def _lines(seen: Seen) -> list[str]:
     )
     moved = moved or f"{math.degrees(seen.moved[0]):.3g} degrees"
     lines.append(f"moves: {seen.names[0]} by {moved}")
-    lines.append(f"likely scenario: {seen.scenario} ({seen.why})")
-    beside = seen.path.with_suffix(".yaml")
-    if beside.exists():
-        return [*lines, f"declared: {beside.name}, which is there already"]
-    lines += ["", f"{beside.name} would be:", ""]
-    return [*lines, *("  " + line for line in seen.yaml.splitlines())]
+    return [*lines, f"likely scenario: {seen.scenario} ({seen.why})"]

@@ -111,7 +111,7 @@ def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[st
     if scenario.has_table and known.foot is not None:
         content |= {"origin_px": list(known.foot), "origin_sd_px": FOOT_SD_PX}
     content["objects"] = [
-        {"name": f"object{n}", "shape": shape, "point_px": [float(x), float(y)]}
+        {"name": f"object{n}", "shape": shape, "point_px": [round(float(x), 1), round(float(y), 1)]}
         | ({"first_frame": first} if (first := known.first_frame((x, y))) else {})
         for n, (x, y) in enumerate(points, 1)
     ]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.api.understand import Answers, Understood, needs_angle
+from galileo_jax.api.understand import Answers, Understood, listed_things, needs_angle
 from galileo_jax.clip.look import FALL_M_S2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_axes import accelerations
@@ -139,12 +139,7 @@ def _points(known: Understood) -> Question | None:
     if not things:
         text = f"{ask}x y of its middle in the first picture, pixels"
         return Question("points", text, known.unseen, "--point 312 221")
-    listed = "; ".join(
-        f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
-        + (f", from frame {first} on" if (first := known.first_frame((x, y))) else "")
-        for n, ((x, y), (width, height)) in enumerate(things.items(), 1)
-    )
-    why = f"{len(things)} things move: {listed}"
+    why = f"{len(things)} things move: {'; '.join(listed_things(known))}"
     likeliest = list(things).index(known.likeliest) if known.likeliest else 0
     meant = list(things)[:2] if known.is_pair else [list(things)[likeliest]]
     example = " ".join(f"--point {x:.0f} {y:.0f}" for x, y in meant)

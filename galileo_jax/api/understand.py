@@ -312,6 +312,15 @@ def _of_clip(clip: Clip) -> str:
     return f"{clip.path.name} says all that is needed: {_kind(clip.scenario)}{at}, {names}."
 
 
+def listed_things(known: Understood) -> list[str]:
+    """Where each thing is that moves in a film, numbered as in the picture of `write_marks`."""
+    return [
+        f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
+        + (f", from frame {first} on" if (first := known.first_frame((x, y))) else "")
+        for n, ((x, y), (width, height)) in enumerate(known.things.items(), 1)
+    ]
+
+
 def write_marks(known: Understood, path: str | Path) -> Path:
     """Writes the first picture of a film, its things numbered in the order in which they set out.
 

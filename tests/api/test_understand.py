@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from galileo_jax.api.clips import load
+from galileo_jax.api.look import look
 from galileo_jax.api.proposed_clip import clip_of, write_yaml, yaml_of
 from galileo_jax.api.questions import parsed, questions
 from galileo_jax.api.understand import is_declared, understand
@@ -246,7 +247,8 @@ def test_of_a_hand_and_what_it_lets_go_the_latter_is_the_default(tmp_path):
 @pytest.mark.video
 def test_a_thrown_ball_is_followed_from_when_it_leaves_the_hand(tmp_path):
     frames, ball = throw()
-    known = understand(written(tmp_path, frames))
+    seen = look(written(tmp_path, frames))
+    known = seen.understood
     asked = questions(known, {})
     assert (asked[0].key, asked[0].default) == ("points", "1")
     said = parsed(asked[0], "1", known, {})
@@ -258,12 +260,17 @@ def test_a_thrown_ball_is_followed_from_when_it_leaves_the_hand(tmp_path):
         (declared,) = content["objects"]
         assert content["scenario"] == "flight" and declared["first_frame"] == first
         np.testing.assert_allclose(declared["point_px"], ball[first], atol=1.5)
+    said = seen.summary()
+    assert "2 things move" in said and f"1 is at {ball[first, 0]:.0f} " in said
+    assert "clip.yaml would be:" in said and "scenario: flight" in seen.yaml
 
 
 @pytest.mark.video
 def test_a_film_in_which_nothing_moves_asks_for_a_point(tmp_path):
     still = np.tile([[50.0, 40.0, 0.0]], (20, 1))
-    known = understand(filmed(tmp_path, still))
+    seen = look(filmed(tmp_path, still))
+    assert "No moving thing was found: nothing moves in it" in seen.summary() and not seen.yaml
+    known = seen.understood
     asked = questions(known, {})
     assert asked[0].key == "points" and asked[0].default is None
     with pytest.raises(InputError, match="nothing moves in it; film with a camera that rests"):
