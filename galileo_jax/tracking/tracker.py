@@ -13,7 +13,12 @@ from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
-from galileo_jax.tracking.second_opinion import is_lost, needs_silhouette, with_silhouette
+from galileo_jax.tracking.second_opinion import (
+    LEAST_SHARE,
+    is_lost,
+    needs_silhouette,
+    with_silhouette,
+)
 from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
@@ -82,14 +87,16 @@ def _second_look(
     open_frames: Callable[[], Iterable[np.ndarray]],
     clock: np.ndarray,
 ) -> Finished:
-    """The track with silhouettes: in grey if these do, as coders keep colours half as finely."""
+    """The track with silhouettes, in colour if that shows the object in more frames by a tenth.
+
+    Coders keep colours half as finely as grey.
+    """
     best = with_silhouette(found, start, paths_of(lambda: map(grey, open_frames()), clock), clock)
     if best is not found and not is_lost(best, start):
         return best
     other = with_silhouette(found, start, paths_of(open_frames, clock), clock)
-    if best is found:
-        return other
-    return max(best, other, key=lambda one: np.isfinite(one.angle_rad).sum())
+    seen, more = (int(np.isfinite(one.angle_rad).sum()) for one in (best, other))
+    return other if best is found or more > (1 + LEAST_SHARE) * seen else best
 
 
 @dataclass
