@@ -11,7 +11,7 @@ differ by shortly before and after; a motion that begins or ends changes on one 
 LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
 """Fewer, or less of the pictures in which something moves, may be the turn of a swing; 24 a second
 stored as 30 repeat one in five."""
-SUDDEN = 0.6  # of what a picture changes by: those before a repeat are alike, those after no less
+SUDDEN = 0.6  # of what a picture changes by: those before a repeat, and after it, are so alike
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
 FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
 AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
@@ -94,7 +94,7 @@ def _is_sudden(
         before, after = change[fresh[max(at - 2, 0) : at]], change[fresh[at : at + 2]]
         least = max(SUDDEN * before.max(initial=0.0), change[index] / REPEATED, LEAST_CHANGE_GREY)
         is_whole = len(before) == len(after) == 2
-        found[index] = is_whole and min(before.min(), after.min() / SUDDEN) > least
+        found[index] = is_whole and min(before.min(), after.min()) > least
     return found
 
 
