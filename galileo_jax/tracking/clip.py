@@ -85,9 +85,12 @@ def _with_points(
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
     known = [max(size) for size in sizes if size is not None]
     span = max(known) if known else UNKNOWN_SPAN_PX
-    ramp_angle = _ramp_angle_rad(clip)
+    scenario, angle = SCENARIOS[clip.scenario], _ramp_angle_rad(clip)
+    may_fly = not (scenario.has_ramp or scenario.is_level)
     try:
-        movers = find_movers(open_frames, span, axes_angle_rad=ramp_angle, advance=advance)
+        movers = find_movers(
+            open_frames, span, axes_angle_rad=angle, may_fly=may_fly, advance=advance
+        )
     except CameraMovesError as error:
         raise InputError(f"{clip.path}: objects: point_px: missing, and {error}") from None
     taken = [item.point_px for item in clip.objects if item.point_px is not None]

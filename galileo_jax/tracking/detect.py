@@ -65,14 +65,17 @@ def find_movers(
     span_px: float,
     *,
     axes_angle_rad: float = 0.0,
+    may_fly: bool = True,
     advance: Callable[[], None] = lambda: None,
 ) -> list[Mover]:
     """The things that move: what flies, what stays in the picture, the others; each by onset.
 
     Args:
-      open_frames: gives the frames; called three times.
+      open_frames: gives the frames; called three times, or once where features move and nothing
+        may fly.
       span_px: about the size of an object; features farther apart are linked by others only.
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
+      may_fly: whether something may, which is looked for then.
       advance: called after every frame.
 
     Raises:
@@ -103,9 +106,8 @@ def find_movers(
                 goes_right=bool(np.median(last[:, 0] - places[:, 0]) >= 0),
             )
         )
-    ways = [
-        one for one in paths_of(open_frames, np.arange(len(path))) if len(one.parts) >= LEAST_SEEN
-    ]
+    ways = paths_of(open_frames, np.arange(len(path))) if may_fly or not movers else []
+    ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
     known = [path[:, members] for members in groups]
     flying = [one for one in ways if _flies(one) and not any(_is_same(one, own) for own in known)]
     if not movers and not flying:
