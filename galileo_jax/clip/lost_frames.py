@@ -84,6 +84,8 @@ def _lost_after(
         more = times_as_long - numbered[i]
         is_jump = more * length > SURE_SDS * sd and 1 <= round(more) <= MOST_LOST
         is_plain = numbered[i] <= 1 + MOST_UNSEEN and across < 0.5 * length
+        if numbered[i] > 1:  # out of sight it may have been struck
+            is_plain &= bool(np.linalg.norm(after - before) < WITHIN * length)
         if is_jump and is_plain and abs(more - round(more)) < WITHIN:
             found[i] = round(more)
     return found

@@ -96,7 +96,8 @@ def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[st
               for axis, one in zip(table.axes, finite, strict=True)}  # fmt: skip
     said: tuple[str, ...] = ()
     is_flat = "z" in others and spread["y"] < MOST_OUT_OF_PLANE * min(spread["x"], spread["z"])
-    if up == "y" and is_flat and not of.scenario.is_level:
+    is_upright = not of.scenario.is_level and of.scenario.angle_deg != 0
+    if up == "y" and is_flat and is_upright:
         up, others = "z", ["x", "y"]
         said = (f"{of.path}: z is taken as up, for it does not move along y (`track_up`)",)
     across = max(others, key=lambda axis: spread[axis])

@@ -39,6 +39,7 @@ BESIDE = WINDOW // 2  # of a rest's last frames so many may hold the slow begin 
 # What slows down to a stop goes as far in its last frames as noise does, and a coder that leaves a
 # picture as it is shows it where it was: errors were 3 times, once 15 times, those of a rest.
 SETTLES = WINDOW // 2 + SETTLES_FRAMES
+CODED_ANEW = 2.0  # a step by so many of all others of a window
 MIN_WINDOWS = 20  # fewer do not tell a variance
 LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
 PIECE = 120  # frames whose likelihood is computed together
@@ -119,7 +120,9 @@ def _look(observation: Observation, i: int) -> tuple[list[slice], Float[np.ndarr
     step = np.diff(observation.position_m[i])
     inner = windows(step, WINDOW - 1, axis=-1).copy()
     middle = inner[..., WINDOW // 2 - 1 : WINDOW // 2 + 1]
-    middle[np.abs(middle) < far[..., None]] = 0.0
+    others = np.delete(np.abs(inner), [WINDOW // 2 - 1, WINDOW // 2], axis=-1).max(axis=-1)
+    stands_out = np.abs(middle) > CODED_ANEW * others[..., None]  # as in no steady motion
+    middle[stands_out & (np.abs(middle) < far[..., None])] = 0.0
     path = np.cumsum(np.pad(inner, ((0, 0), (0, 0), (1, 0))), axis=-1)
     white = (path - path.mean(axis=-1, keepdims=True)) / sd
     still = seen & (np.nan_to_num(np.abs(white).max(axis=(0, 2)), nan=np.inf) < STILL_SDS)

@@ -80,7 +80,7 @@ def facing(apart_m: Float[jax.Array, " 2"], one: Rim, other: Rim) -> tuple[jax.A
     distance = jnp.sqrt(jnp.sum(apart_m**2))
     straight = jnp.arctan2(apart_m[1], apart_m[0])
 
-    def nearer(_: int, beside: jax.Array) -> jax.Array:
+    def nearer(_: Any, beside: jax.Array) -> jax.Array:
         rims = [rim.reach_m(straight + beside) for rim in (one, other)]
         slope, bend = (sum(rim[k] for rim in rims) for k in (1, 2))
         off = distance * jnp.sin(beside) + slope

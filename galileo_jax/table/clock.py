@@ -86,7 +86,7 @@ def _clock_of_day(cell: str, first: str, where: str) -> str:
             f"{where}: {cell[:40]!r} is no time of the same half day as {first[:40]!r}; write "
             "seconds, such as 0.125"
         )
-    return found[3]
+    return f"{found[3]}:00" if found[3].count(":") == 1 else found[3]  # hours and minutes
 
 
 def _seconds(match: re.Match[str]) -> float:
@@ -122,8 +122,10 @@ def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> 
             return float(near)
     if 60 <= last.max() < 100 and (fps or 0) <= 60:
         return 100.0
-    told = (float(round(fps)), 100.0) if fps is not None and steps.size else ()
+    if fps is None or not steps.size:
+        return None
     # From row to row one frame has gone by, or as many hundredths as a frame takes.
-    rate = (fps or 0.0) * float(np.mean(steps)) if told else 0.0
-    agree = (n for n in told if abs(rate / n - 1) < SAME_RATE)
-    return next((n for n in agree if last.max() < n), None)
+    if np.median(steps) == 1 and last.max() < round(fps):
+        return float(round(fps))
+    is_hundredths = abs(fps * float(np.mean(steps)) / 100.0 - 1) < SAME_RATE
+    return 100.0 if is_hundredths and last.max() < 100 else None

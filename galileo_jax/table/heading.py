@@ -20,7 +20,7 @@ MULTI = "multi:"
 AXES = ("x", "y", "z")
 RATES = (
     *("frequency", "fps", "frame rate", "framerate", "sampling rate"),
-    *("capture frame rate", "export frame rate", "datarate", "camerarate"),
+    *("export frame rate", "capture frame rate", "datarate", "camerarate"),
 )
 UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit")
 MARKERS = "marker_names"
@@ -235,6 +235,6 @@ def _beside(above: Rows, keys: Sequence[str]) -> Iterator[str]:
 
 
 def _frame_s(above: Rows) -> float | None:
-    rates = (float(cell.replace(",", ".")) for cell in _beside(above, RATES) if is_number(cell))
-    rate = next(rates, 0.0)
+    cells = (cell for key in RATES for cell in _beside(above, (key,)))
+    rate = next((float(cell.replace(",", ".")) for cell in cells if is_number(cell)), 0.0)
     return 1 / rate if rate > 0 else None

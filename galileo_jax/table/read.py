@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -155,13 +156,16 @@ def _per_unit(columns: Columns, n: int) -> float:
 
 
 def _check_one_clock(columns: Columns) -> None:
-    """Refuses columns of time that go by at different rates: motions beside each other."""
-    clocks = {n: columns.numbers[n] for n in columns.of("time")}
-    gone = {n: float(np.ptp(one.seen)) * _per_unit(columns, n)
-            for n, one in clocks.items() if one.steps.size and one.steps.min() > 0}  # fmt: skip
-    first = next(iter(gone), -1)
-    for n in gone:
-        if abs(gone[n] - gone[first]) > SAME_CLOCK * gone[first]:
+    """Refuses times, each before places of its own, that go by at different rates."""
+    times, places = columns.of("time"), [n for role in PLACES for n in columns.of(role)]
+    ends = [*times[1:], len(columns.meanings)]
+    each = zip(times, ends, strict=False)
+    clocks = [n for n, end in each if any(n < at < end for at in places)]
+    for first, n in pairwise(clocks):
+        one, other = (columns.numbers[at].values * _per_unit(columns, at) for at in (first, n))
+        both = np.isfinite(one) & np.isfinite(other)
+        gone, there = (float(np.ptp(times[both])) if both.any() else 0.0 for times in (one, other))
+        if abs(gone - there) > SAME_CLOCK * gone:
             raise InputError(
                 f"{columns.name_of(first)!r} and {columns.name_of(n)!r} are two clocks; a table "
                 "for each expected"

@@ -159,12 +159,12 @@ def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndar
     """Places `[object, axis, row]`, NaN where a number stands for "not seen", and what was done.
 
     Such a place is 0, -1 or -9999 on all axes, or comes again and again to the last digit, and the
-    steps to and from it are longer than any other.
+    steps to and from it are longer than any other. At an end alone it may be a rest.
     """
     found, values = places.copy(), set()
     for body, place in enumerate(places):
         seen = np.flatnonzero(np.isfinite(place).all(axis=0))
-        steps = np.linalg.norm(np.diff(place[:, seen]), axis=0)
+        steps = np.linalg.norm(np.diff(place[:, seen]), axis=0) / np.diff(seen)
         each, which = np.unique(place[:, seen].T, axis=0, return_inverse=True)
         for value in range(len(each)) if len(seen) >= LEAST_ROWS else ():
             there = which.ravel() == value
@@ -177,7 +177,7 @@ def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndar
                 continue
             for run in runs:
                 sides = [at for at in (run[0], run[-1] + 1) if 0 < at < len(seen)]
-                if not is_near[sides].any():
+                if not is_near[sides].any() and (len(sides) > 1 or len(runs) > 1):
                     found[body][:, seen[run]] = np.nan
                     values.add(", ".join(f"{one:g}" for one in each[value]))
     rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))

@@ -227,6 +227,32 @@ def test_two_clocks_in_one_table_are_refused(tmp_path: Path) -> None:
         read(tmp_path, text("Time (s) Run #1,y Run #1,Time (s) Run #2,y Run #2", body=body))
 
 
+@pytest.mark.parametrize("titles", ["t,t2,x,y", "t,x,y,t2", "time,real time,x,y"])
+def test_a_second_time_without_places_of_its_own_is_no_second_clock(titles, tmp_path: Path) -> None:
+    at = [titles.split(",").index(one) for one in ("x", "y")]
+    body = []
+    for t, x, y in truth().T:
+        cells = [t, t * t, t * t, t * t]
+        cells[at[0]], cells[at[1]] = x, y
+        body.append(",".join(f"{one:.6f}" for one in cells))
+    check(read(tmp_path, text(titles, body=body)))
+
+
+def test_a_rest_at_the_origin_is_no_mark_of_what_was_not_seen(tmp_path: Path) -> None:
+    """It is struck while it is out of sight."""
+    x = [0.0] * 11 + [np.nan] * 4 + [0.3 + 0.05 * n for n in range(10)]
+    body = [
+        f"{0.04 * n:.2f},{'' if np.isnan(one) else f'{one:.3f}'},{0 * n}" for n, one in enumerate(x)
+    ]
+    table = read(tmp_path, text("t,x,y", body=body))
+    assert (table.position[0, 0, :11] == 0).all()
+
+
+def test_dates_with_hours_and_minutes_are_minutes_apart(tmp_path: Path) -> None:
+    body = [f"14.05.2024 09:{10 + n};{x};{y}" for n, (_, x, y) in enumerate(truth().T)]
+    assert np.diff(read(tmp_path, text("t;x;y", body=body)).clock) == pytest.approx(60.0)
+
+
 def test_a_row_for_each_particle(tmp_path: Path) -> None:
     rows = [",y,x,mass,frame,particle"]
     for n, (_, x, y) in enumerate(truth().T):
