@@ -332,8 +332,7 @@ def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanatio
 def _gravity(fit: Fit, engine: str, seed: int) -> dict[str, Any]:
     """What a fit says of gravity where that is free; empty where it tells nothing."""
     clip = fit.measurements[0].clip
-    scenario = SCENARIOS[clip.scenario]
-    if scenario.has_ramp or scenario.is_level or not clip.is_scale_known:
+    if SCENARIOS[clip.scenario].has_surface or not clip.is_scale_known:
         return {}
     progress.report("what gravity it shows", 0.7)
     free = fit_tracks(tracks_of(fit.measurements), free="gravity", engine=engine, seed=seed)

@@ -1,7 +1,7 @@
 """`look`: what is understood of a table or film, for a person to check."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,7 +41,7 @@ class Look:
         """What moves and how; a film is looked through for it, which takes some seconds."""
         from galileo_jax.api.understand import understand
 
-        return understand(self.path)
+        return replace(understand(self.path), look=self)
 
     @property
     def yaml(self) -> str:
@@ -58,10 +58,9 @@ class Look:
         beside = self.path.with_suffix(".yaml")
         if beside.exists():
             return "\n".join([*lines, f"declared: {beside.name}, which is there already"])
-        if not self.yaml:
-            return "\n".join(lines)
-        written = ["  " + line for line in self.yaml.splitlines()]
-        return "\n".join([*lines, "", f"{beside.name} would be:", "", *written])
+        if text := self.yaml:
+            lines += ["", f"{beside.name} would be:", ""]
+        return "\n".join([*lines, *("  " + line for line in text.splitlines())])
 
     def plot(self, path: str | Path) -> Path:
         """Writes the places in time as a figure, by the path's suffix (png, svg, pdf).

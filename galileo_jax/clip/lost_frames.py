@@ -77,15 +77,15 @@ def _lost_after(
         expected = np.median(np.concatenate(sides, axis=1), axis=1)
         length = float(np.linalg.norm(expected))
         before, after = (np.mean(side, axis=1) for side in sides)
-        if np.linalg.norm(after - before) >= length:  # it stops there, sets out, or turns
+        # It stops there, sets out, or turns; out of sight it may have been struck.
+        most = length if numbered[i] == 1 else WITHIN * length
+        if np.linalg.norm(after - before) >= most:
             continue
         times_as_long = float(moved[:, i] @ expected) / length**2
         across = float(np.linalg.norm(moved[:, i] - times_as_long * expected))
         more = times_as_long - numbered[i]
         is_jump = more * length > SURE_SDS * sd and 1 <= round(more) <= MOST_LOST
         is_plain = numbered[i] <= 1 + MOST_UNSEEN and across < 0.5 * length
-        if numbered[i] > 1:  # out of sight it may have been struck
-            is_plain &= bool(np.linalg.norm(after - before) < WITHIN * length)
         if is_jump and is_plain and abs(more - round(more)) < WITHIN:
             found[i] = round(more)
     return found

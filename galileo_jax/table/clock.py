@@ -19,7 +19,7 @@ DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(:\d{2}([.,]\d+)?)?\s?(Z|[+-
 DAY = re.compile(r"(?:(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*)?([\d:.,]+)\s*([AaPp]\.?[Mm]\.?)?")
 """Another date than `DATE`, its day, clock, and half of the day: 14.05.2024 09:31:02,033."""
 
-SAME_RATE = 0.1
+SAME_RATE = 0.1  # of a rate, by which hundredths from row to row may tell another
 COMMON_FPS = (24, 25, 30, 48, 50, 60, 100, 120, 240)
 
 

@@ -158,8 +158,7 @@ def _per_unit(columns: Columns, n: int) -> float:
 def _check_one_clock(columns: Columns) -> None:
     """Refuses times, each before places of its own, that go by at different rates."""
     times, places = columns.of("time"), [n for role in PLACES for n in columns.of(role)]
-    ends = [*times[1:], len(columns.meanings)]
-    each = zip(times, ends, strict=False)
+    each = pairwise([*times, len(columns.meanings)])
     clocks = [n for n, end in each if any(n < at < end for at in places)]
     for first, n in pairwise(clocks):
         one, other = (columns.numbers[at].values * _per_unit(columns, at) for at in (first, n))

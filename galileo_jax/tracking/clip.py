@@ -85,8 +85,7 @@ def _with_points(
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
     known = [max(size) for size in sizes if size is not None]
     span = max(known) if known else UNKNOWN_SPAN_PX
-    scenario, angle = SCENARIOS[clip.scenario], _ramp_angle_rad(clip)
-    may_fly = not (scenario.has_ramp or scenario.is_level)
+    angle, may_fly = _ramp_angle_rad(clip), not SCENARIOS[clip.scenario].has_surface
     try:
         movers = find_movers(
             open_frames, span, axes_angle_rad=angle, may_fly=may_fly, advance=advance

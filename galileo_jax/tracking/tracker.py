@@ -92,7 +92,8 @@ def _second_look(
     Coders keep colours half as finely as grey.
     """
     best = with_silhouette(found, start, paths_of(lambda: map(grey, open_frames()), clock), clock)
-    if best is not found and not is_lost(best, start):
+    has_colours = next(iter(open_frames())).ndim == 3
+    if not has_colours or (best is not found and not is_lost(best, start)):
         return best
     other = with_silhouette(found, start, paths_of(open_frames, clock), clock)
     seen, more = (int(np.isfinite(one.angle_rad).sum()) for one in (best, other))

@@ -53,6 +53,15 @@ def test_what_comes_to_rest_is_not_yet_at_rest():
     assert (found[75:] < 0.8).all()
 
 
+def test_a_slow_even_motion_is_no_rest():
+    """No step of it stands out, as one does where a picture is coded anew."""
+    whole = filmed(1.0)
+    sd = np.sqrt(whole.covariance_m2[0, 0, 0])
+    path = np.stack([1.4 * SD_M * 1.5 * np.arange(FRAMES), np.zeros(FRAMES)])[None]
+    noise = 0.1 * sd * np.random.default_rng(5).standard_normal((1, 2, FRAMES))
+    assert (scales(replace(whole, position_m=path + noise)) == 1.0).all()
+
+
 def test_a_short_track_is_left_as_it_is():
     whole = filmed(0.5)
     short = Observation(

@@ -44,6 +44,11 @@ class Scenario:
     without: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
 
+    @property
+    def has_surface(self) -> bool:
+        """Whether something carries the objects: a ramp, a table."""
+        return self.has_ramp or self.is_level
+
 
 SCENARIOS: Registry[Scenario] = Registry(
     "scenario", "scenarios", "galileo_jax.clip.scenarios.library"

@@ -115,7 +115,7 @@ def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
     Once it has gone half its size: until then a hand may be at it.
     """
     scenario = SCENARIOS[clip.scenario]
-    is_asked = (scenario.has_ramp or scenario.is_level) and clip.is_scale_known
+    is_asked = scenario.has_surface and clip.is_scale_known
     path = observation.path(i)
     seen = path.frames
     if not is_asked or len(path) < FEWEST_FRAMES:

@@ -129,7 +129,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
       InputError: an object is never seen, or one stands before the one declared before it.
     """
     scenario = SCENARIOS[clip.scenario]
-    has_surface, has_table = scenario.has_ramp or scenario.is_level, scenario.has_table
+    has_surface, has_table = scenario.has_surface, scenario.has_table
     if scenario.has_ramp:
         assert clip.ramp_angle_deg is not None  # the clip's own validation
         angle = math.radians(clip.ramp_angle_deg)
