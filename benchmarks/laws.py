@@ -21,11 +21,11 @@ from benchmarks.exotic_effects import LAWS
 from benchmarks.hidden_cases import ANGLES_DEG, TRACK
 from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnose import diagnose
 from galileo_jax.diagnosis.diagnosis import Law
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORMS

@@ -29,10 +29,10 @@ import numpy as np
 from benchmarks import hidden_cases, hidden_effects, tables, verdicts
 from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis.thresholds import DECISIVE
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORM_NAMES

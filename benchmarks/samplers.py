@@ -39,8 +39,8 @@ from scipy import stats
 from benchmarks import peers, scoring, tables, tracks
 from benchmarks.journal import Journal
 from benchmarks.tracks import Case
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import convergence
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter

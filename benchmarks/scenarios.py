@@ -22,14 +22,15 @@ import numpy as np
 from benchmarks import tables
 from benchmarks.scoring import Score, of_entry, of_result, summary_of
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.observation.observation import Observation
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit

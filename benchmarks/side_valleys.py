@@ -25,9 +25,9 @@ import numpy as np
 from benchmarks import tables, tracks
 from benchmarks.journal import Journal
 from benchmarks.tracks import Case
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.fields import Shape
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution

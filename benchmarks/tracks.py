@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.observation.observation import Observation

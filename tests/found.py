@@ -6,12 +6,12 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Law, MissingForce, Round, Verdict
 from galileo_jax.diagnosis.verdict import ranked
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import yaml
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.result import make_result

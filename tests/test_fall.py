@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.build_problem import make_joint_problem, make_problem
 from galileo_jax.clip.checks import check_same_objects
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command, diagnose, fit
-from galileo_jax.inference.build_problem import make_joint_problem, make_problem
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.model import MASS_PRIOR
 from galileo_jax.model.parameters import LogNormal, absent

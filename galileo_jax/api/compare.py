@@ -16,11 +16,12 @@ from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
+from galileo_jax.observation.digest import digest
 from galileo_jax.report.comparison_page import write_comparison_page
 from galileo_jax.report.diagnosis_charts import comparison_chart
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.results.command_line import command_line
-from galileo_jax.results.stale_outputs import TRACKS, digest
+from galileo_jax.results.stale_outputs import TRACKS
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError

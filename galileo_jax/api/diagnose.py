@@ -11,6 +11,7 @@ from galileo_jax import __version__
 from galileo_jax.api.fit_result import Fit, Found, make_fit, resolved
 from galileo_jax.api.motion import Motion, motions_at
 from galileo_jax.api.track import TrackLike, as_measurements
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
@@ -22,20 +23,20 @@ from galileo_jax.diagnosis.laws.grammar import proposed_file
 from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.experiment.choose import with_next
 from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
+from galileo_jax.observation.digest import digest
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.diagnosis_charts import diagnosis_chart
 from galileo_jax.report.diagnosis_page import write_diagnosis_page
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.results.command_line import command_line
-from galileo_jax.results.stale_outputs import TRACKS, digest
+from galileo_jax.results.stale_outputs import TRACKS
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text

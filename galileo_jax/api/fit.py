@@ -17,9 +17,9 @@ from galileo_jax.api.options import (
     options_of,
 )
 from galileo_jax.api.track import TrackLike, as_measurements
+from galileo_jax.assembly.build_problem import make_joint_problem
+from galileo_jax.assembly.checkpoint_identity import identity_of
 from galileo_jax.clip.schema import Clip
-from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import (
     fit_posterior,
     laplace_posterior,

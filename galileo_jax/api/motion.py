@@ -10,7 +10,7 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.report.side_view import outline
 from galileo_jax.rollout.motion import pitch
 from galileo_jax.runtime.errors import InputError

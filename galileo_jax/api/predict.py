@@ -146,7 +146,7 @@ def predict(
         (run,) = fit.runs(fit.folder or Path("."))
         progress.report("rolling out", 0.1)
         motions = extrapolate(run, seconds, draws, seed)
-        found = answers(run, motions, seconds, seed)
+        found = {"run": str(run.folder), **answers(run, motions, seconds, seed)}
         made = Prediction(run, motions, found)
         progress.report("rolled out", 1.0, made)
         return made

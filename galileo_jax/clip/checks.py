@@ -12,7 +12,7 @@ from galileo_jax.clip import placement
 from galileo_jax.clip.fields import MAX_SCALE_SD_SHARE, SIZE_MEANING, short
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile, ClipObject
-from galileo_jax.clip.walls import distance_to_wall
+from galileo_jax.numerics.line_segments import distance_to_segment
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -134,7 +134,7 @@ def check_walls(clip: Clip, observation: Observation | None, fail: Any) -> None:
         for item in clip.objects:
             if item.size_m is None or item.name not in places:
                 continue
-            apart = float(distance_to_wall(places[item.name][:2], wall.ends_m))
+            apart = float(distance_to_segment(places[item.name][:2], wall.ends_m))
             if apart < (1 - INTO_WALL) * item.size_m[0]:
                 fail(
                     key,

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.clip.schema import Clip
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 
 LENS_CRITERIA = (3, 100, 1e-12)  # both, of OpenCV: so many iterations, or so close
 SMALL_PX = 0.01  # of differences

@@ -31,7 +31,8 @@ from galileo_jax.clip.track_csv import (
     read_observation_csv,
 )
 from galileo_jax.clip.track_noise import roughness_covariance_m2
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.pandas_h5 import is_hdf5

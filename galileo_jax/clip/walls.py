@@ -8,20 +8,15 @@ The ends of the line that rims touch; on either side of it there may be pucks.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Annotated, Any
 
-import numpy as np
-from jaxtyping import Bool, Float
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
 from galileo_jax.clip.fields import Point, short, wrong
-from galileo_jax.observation.observation import stretches
 
 MOST_WALLS = 12
 FARTHEST_M = 100.0
 SHORTEST_M, SHORTEST_PX = 0.005, 4.0
-NEAR = 1.15  # of a radius: so near is a puck that bounces off a wall in some frame
 PAIRS = (("from_m", "to_m"), ("from_px", "to_px"))
 
 
@@ -84,27 +79,6 @@ def _walls(value: Any) -> Any:
     if len(value) > MOST_WALLS:
         raise wrong(f"{len(value)} walls; {MOST_WALLS} at most")
     return tuple(value)
-
-
-def distance_to_wall(
-    places_m: np.ndarray, ends_m: Sequence[Sequence[float]]
-) -> Float[np.ndarray, "..."]:
-    """Of points `[..., 2]` from the line between two ends, m."""
-    start, along = np.asarray(ends_m[0], float), np.subtract(ends_m[1], ends_m[0])
-    share = np.clip((places_m - start) @ along / (along @ along), 0.0, 1.0)
-    return np.linalg.norm(places_m - start - share[..., None] * along, axis=-1)
-
-
-def bounces(
-    place_m: Float[np.ndarray, "2 frame"],
-    is_seen: Bool[np.ndarray, " frame"],
-    ends_m: Sequence[Sequence[float]],
-    radius_m: float,
-) -> list[int]:
-    """The frames in which a puck is nearest to a wall, one for each stay beside it."""
-    away = distance_to_wall(np.moveaxis(np.nan_to_num(place_m), 0, -1), ends_m)
-    away = np.where(is_seen, away, np.inf)
-    return [near.start + int(np.argmin(away[near])) for near in stretches(away < NEAR * radius_m)]
 
 
 Walls = Annotated[tuple[Wall, ...], BeforeValidator(_walls)]

@@ -16,26 +16,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.numerics.normal_matrix import inverse, symmetric_root
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.gaussian_likelihood import is_measured
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
-
-
-def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
-    """Whitened residuals of each clip, `[point, value]`.
-
-    `theta` is `[point, parameter]`, `noise_scale` `[clip]`.
-    """
-    found = []
-    for clip, problem in enumerate(trials.problems):
-        predicted = problem.simulate_batch(trials.of_clip(theta, clip))
-        found.append(problem.whiten(predicted, float(noise_scale[clip])))
-    return found
 
 
 def replicates(
@@ -71,7 +59,7 @@ def replicates(
     centre = generator.standard_normal((count, len(free)))
 
     def predicted(z: np.ndarray) -> np.ndarray:
-        return np.concatenate(whitened(trials, trials.theta(z, fit.free), noise_scale), axis=1)
+        return np.concatenate(trials.whitened(trials.theta(z, fit.free), noise_scale), axis=1)
 
     base = predicted(fit.z[None])
 

@@ -8,9 +8,9 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 
-from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.numerics.line_segments import distance_to_segment
 
 ON_A_SURFACE = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
 PHASES = (*ON_A_SURFACE, "fall", "flight", "swing", "liquid")
@@ -109,6 +109,6 @@ def _hit_s(position: np.ndarray, times_s: np.ndarray, scene: Surroundings) -> li
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
         note(nearest(apart) - half_m[i] - half_m[j], i, j)
     for i, ends in product(range(len(position)), scene.walls_m):
-        away = distance_to_wall(np.moveaxis(position[i, :2], 0, -1), ends)
+        away = distance_to_segment(np.moveaxis(position[i, :2], 0, -1), ends)
         note(nearest(away) - half_m[i], i)
     return found

@@ -31,7 +31,7 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.experiment.settings import Can, Choices, known_as, parse_can
-from galileo_jax.results.stale_outputs import digest
+from galileo_jax.observation.digest import digest
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import check_cancelled

@@ -19,8 +19,8 @@ import numpy as np
 
 from galileo_jax.experiment.hypothesis_probabilities import Belief
 from galileo_jax.experiment.proposal import Proposal, seen_as
-from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.numerics.normal_matrix import symmetric_root
 
 NUM_DRAWS = 63  # and the mode: 64 rollouts for each hypothesis
 MOVED_M = 0.002  # an object that goes so far was hit

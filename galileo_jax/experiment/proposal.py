@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.fields import MIN_RAMP_ANGLE_DEG
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sizes import extents
 from galileo_jax.experiment.settings import Setting, known_as
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.model.scene.scene import extents
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 

@@ -17,12 +17,12 @@ from scipy.special import softmax
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.fits.importance_sampling import weighed
-from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.log_posterior import LogPosterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.resampled import resampled
+from galileo_jax.numerics.normal_matrix import symmetric_root
 
 NUM_DRAWS = 4000
 MOST_PARAMETERS = 40  # of more, as many trials have, hardly a draw weighs anything

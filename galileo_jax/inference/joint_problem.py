@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 from scipy.special import chdtrc
 
 from galileo_jax.inference.problem import Problem
@@ -223,3 +224,13 @@ class JointProblem:
     def noise_scale(self, theta: np.ndarray, clip: int) -> float:
         """The noise scale of one clip."""
         return float(theta[len(self.model_parameters) + clip])
+
+    def whitened(
+        self, theta: Float[np.ndarray, "point parameter"], noise_scale: Float[np.ndarray, " clip"]
+    ) -> list[Float[np.ndarray, "point value"]]:
+        """Whitened residuals of each clip, from rollouts."""
+        found = []
+        for clip, problem in enumerate(self.problems):
+            predicted = problem.simulate_batch(self.of_clip(theta, clip))
+            found.append(problem.whiten(predicted, float(noise_scale[clip])))
+        return found

@@ -19,8 +19,8 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
-from galileo_jax.model.scene.pendulum_expected import period_s
-from galileo_jax.observation.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.periodogram import period_s
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 

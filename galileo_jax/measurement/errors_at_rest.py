@@ -29,8 +29,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri, logsumexp
 
-from galileo_jax.observation.observation import AWAY_M, Observation, stretches
-from galileo_jax.observation.random_patterns import random_patterns
+from galileo_jax.numerics.random_patterns import random_patterns
+from galileo_jax.numerics.runs import stretches
+from galileo_jax.observation.observation import AWAY_M, Observation
 from galileo_jax.tracking.noise import SETTLES_FRAMES
 
 WINDOW = 9  # frames

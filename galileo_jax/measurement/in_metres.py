@@ -36,8 +36,8 @@ from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
 from galileo_jax.measurement.shared_errors import beside, with_errors
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.numerics.random_patterns import random_patterns
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import random_patterns
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.motion_compensation import LASTS_FRAMES
 from galileo_jax.tracking.track import Track

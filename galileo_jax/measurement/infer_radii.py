@@ -17,7 +17,8 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.walls import Wall
 from galileo_jax.measurement.in_metres import origin_of
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
 UNKNOWN_RADIUS_M = 0.02

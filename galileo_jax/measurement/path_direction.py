@@ -16,7 +16,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG, MIN_POINTS, falls_deg
-from galileo_jax.observation.least_squares import line_through
+from galileo_jax.numerics.least_squares import line_through
 from galileo_jax.observation.observation import Observation
 
 CLEAR = 4.0

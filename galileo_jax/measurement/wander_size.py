@@ -24,7 +24,8 @@ from jaxtyping import Float
 from scipy.special import logsumexp
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.clip.walls import Wall, bounces
+from galileo_jax.clip.walls import Wall
+from galileo_jax.numerics.line_segments import nearest_frames
 from galileo_jax.observation.observation import Observation
 
 LARGEST_M, LASTS_S = 4e-4, 0.3
@@ -51,7 +52,9 @@ def with_wander(
         radius_m = (objects[i].size_m or (0.0,))[0] if walls else 0.0
         place, mask = observation.position_m[i], observation.mask[i]
         bounced = [
-            frame for wall in walls for frame in bounces(place[:2], mask, wall.ends_m, radius_m)
+            frame
+            for wall in walls
+            for frame in nearest_frames(place[:2], mask, wall.ends_m, radius_m)
         ]
         for piece, axis in product(_pieces(observation, i, bounced), range(num_axes)):
             if len(piece) >= LEAST_FRAMES:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-NOMINAL_SCALE_PX_PER_M = 500.0
 UNMEASURED_SD_M = 10.0
 """Across the way of a motion of which one coordinate was measured: the error says nothing, and is
 still small enough for the other's to keep its digits in one covariance."""
@@ -14,13 +13,6 @@ AWAY_SD, AWAY_M = 6.0, 3e-4  # an object farther than both from where it stood h
 STANDING_FRAMES = 5  # that say where it stood
 LEAST_SD_M = 1e-6  # smaller errors do not keep their digits beside it
 Steps = Float[np.ndarray, " step"]
-
-
-def stretches(chosen: Bool[np.ndarray, " frame"]) -> list[slice]:
-    """The runs of chosen frames that follow each other."""
-    steps = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
-    ends = zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True)
-    return [slice(int(first), int(after)) for first, after in ends]
 
 
 @dataclass(frozen=True)

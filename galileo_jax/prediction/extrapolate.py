@@ -5,15 +5,16 @@ the travel, y up, origin at the foot of the ramp.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.summarise import summarise
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
-from galileo_jax.results.run import Run
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine
 from galileo_jax.runtime.errors import InputError
@@ -22,6 +23,25 @@ MOVING_M_S = 5e-3  # contacts at rest creep at 0.2 mm/s, bumpers part at a few m
 SLIDES_M = 1e-3  # contacts take up some hundredths of a millimetre at the start
 TOUCH_M = 1e-3  # bumpers give way by less
 GRID_S = 1 / 240
+
+
+class Fitted(Protocol):
+    """A finished fit of one clip."""
+
+    @property
+    def problem(self) -> Problem:
+        """Observation, model, and engine, as fitted."""
+        ...
+
+    @property
+    def posterior(self) -> Posterior:
+        """Draws in the parameters' units."""
+        ...
+
+    @property
+    def best(self) -> np.ndarray:
+        """`[parameter]`, the best fit in the parameters' units."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -48,10 +68,10 @@ class Motions:
         return np.linalg.norm(self.velocity_m_s, axis=2)
 
 
-def draw_theta(run: Run, num_draws: int, seed: int) -> np.ndarray:
+def draw_theta(fit: Fitted, num_draws: int, seed: int) -> np.ndarray:
     """`num_draws` draws of the model's parameters from the posterior, `[draw, parameter]`."""
-    draws = run.posterior.flat()
-    columns = [run.posterior.names.index(name) for name in run.problem.model.names]
+    draws = fit.posterior.flat()
+    columns = [fit.posterior.names.index(name) for name in fit.problem.model.names]
     chosen = np.random.default_rng(seed).choice(
         len(draws), num_draws, replace=num_draws > len(draws)
     )
@@ -83,14 +103,14 @@ def roll_out(model: Model, engine: Engine, theta: np.ndarray, times_s: np.ndarra
     return Motions(theta, np.asarray(times_s), at_position, at_velocity, num_failed)
 
 
-def extrapolate(run: Run, seconds: float, num_draws: int, seed: int) -> Motions:
+def extrapolate(fit: Fitted, seconds: float, num_draws: int, seed: int) -> Motions:
     """The clip's motion and `seconds` more, drawn from the posterior, every 1/240 s."""
-    model = run.problem.model
-    theta = draw_theta(run, num_draws, seed)
-    until_s = float(run.problem.observation.times_s[-1]) + seconds
+    model = fit.problem.model
+    theta = draw_theta(fit, num_draws, seed)
+    until_s = float(fit.problem.observation.times_s[-1]) + seconds
     longest = max(float(_since_release(model, row, np.asarray(until_s))) for row in theta)
     longer = replace(model, duration_s=max(longest, GRID_S))
-    engine = make_engine(run.problem.engine.name, longer)
+    engine = make_engine(fit.problem.engine.name, longer)
     times_s = np.linspace(0.0, until_s, int(np.ceil(until_s / GRID_S)) + 1)
     return roll_out(longer, engine, theta, times_s)
 
@@ -117,15 +137,15 @@ def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.nd
     return when
 
 
-def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, Any]:
+def answers(fit: Fitted, motions: Motions, seconds: float, seed: int) -> dict[str, Any]:
     """Will it slide, how far, where does it stop, does it hit: prediction.json.
 
     Returns:
       Probabilities are shares of the draws; quantities are mean, sd and central 95 % interval
       over the draws to which they apply (rest: those that stop), null where there are none.
     """
-    surroundings = run.problem.model.scene.surroundings
-    clip_end_s = float(run.problem.observation.times_s[-1])
+    surroundings = fit.problem.model.scene.surroundings
+    clip_end_s = float(fit.problem.observation.times_s[-1])
     beyond = np.searchsorted(motions.times_s, clip_end_s)
     steps = np.linalg.norm(np.diff(motions.position_m, axis=-1), axis=2)
     is_moving = motions.speed_m_s > MOVING_M_S
@@ -154,7 +174,6 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
         happens = np.isfinite(when)
         hit = {"probability": float(happens.mean()), "time_s": _summary(when[happens])}
     return {
-        "run": str(run.folder),
         "clip_end_s": clip_end_s,
         "predicted_until_s": float(motions.times_s[-1]),
         "seconds_beyond_clip_s": seconds,
@@ -163,7 +182,7 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
         "num_draws": len(motions.theta),
         "num_failed": motions.num_failed,
         "seed": seed,
-        "engine": run.problem.engine.name,
+        "engine": fit.problem.engine.name,
         "version": __version__,
     }
 

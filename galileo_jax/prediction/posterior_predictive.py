@@ -9,13 +9,13 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.extrapolate import (
     GRID_S,
+    Fitted,
     Motions,
     as_measured,
     draw_theta,
     hit_s,
     roll_out,
 )
-from galileo_jax.results.run import Run
 
 NUM_DRAWS = 100
 
@@ -48,14 +48,14 @@ class PosteriorPredictive:
         return np.linalg.norm(span, axis=-1) > 2e-3
 
 
-def posterior_predictive(run: Run, seed: int) -> PosteriorPredictive:
+def posterior_predictive(fit: Fitted, seed: int) -> PosteriorPredictive:
     """Rolls out the best fit, for the residuals, and draws, for the bands."""
-    problem = run.problem
+    problem = fit.problem
     observation, surroundings = problem.observation, problem.model.scene.surroundings
     # Not the mean or the median: along a curved ridge these are no fit.
-    best = run.best[None, : len(problem.model.names)]
+    best = fit.best[None, : len(problem.model.names)]
     frames = observation.times_s
-    draws = roll_out(problem.model, problem.engine, draw_theta(run, NUM_DRAWS, seed), frames)
+    draws = roll_out(problem.model, problem.engine, draw_theta(fit, NUM_DRAWS, seed), frames)
     # Objects may touch between two frames only.
     times = np.union1d(frames, np.arange(frames[0], frames[-1], GRID_S))
     centre = roll_out(problem.model, problem.engine, best, times)

@@ -12,7 +12,7 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.scene.scene import Scene
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.prediction.extrapolate import Motions, as_measured
 from galileo_jax.report.style import matplotlib_style, object_colour, palette
 from galileo_jax.report.video_frames import first_and_last_frame

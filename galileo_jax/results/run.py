@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem

@@ -5,14 +5,12 @@ comparison or a diagnosis is a statement about the clip and is kept, with a warn
 from a different track.
 """
 
-import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from galileo_jax.observation.digest import digest
 from galileo_jax.observation.observation import Observation
 
 PREDICTION = "prediction.json"
@@ -21,15 +19,6 @@ PREDICTION_KEYS = {"run", "seconds_beyond_clip_s", "version"}  # what makes the 
 DOCUMENTS = {"compare": "compare/compare.json", "diagnose": "diagnosis/diagnosis.json"}
 TRACKS = "tracks"  # key of those documents: the digests of what they were made of
 RUN_FILES = ("clip.yaml", "observation.csv", "errors.npz", "report.html")
-
-
-def digest(observation: Observation) -> str:
-    """What tells one track from another: names, times, which points were seen and where."""
-    found = hashlib.sha256(json.dumps(observation.names).encode())
-    seen = np.where(observation.mask[:, None], observation.position_m, 0.0)
-    for array in (observation.times_s, seen, observation.mask):
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()[:16]
 
 
 def remove_stale_prediction(folder: Path) -> bool:

@@ -11,7 +11,7 @@ from jaxtyping import Int
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import UNKNOWN_BOX_M, Scene
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.rollout.events import cubic
 from galileo_jax.rollout.motion import Array
 from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M
@@ -60,15 +60,10 @@ def past_the_foot_m(scene: Surroundings) -> float | jax.Array:
 
 def with_depths(scene: Scene) -> Surroundings:
     """The surroundings with the boxes' extents and places across the travel."""
-
-    def depth(size_m: tuple[float, ...] | None) -> float:
-        return (size_m or UNKNOWN_BOX_M)[1] / 2
-
-    return replace(
-        scene.surroundings,
-        half_depth_m=tuple(depth(each.size_m) for each in scene.objects),
-        beside_m=scene.z_m,
-    )
+    each = zip(scene.objects, scene.surroundings.half_length_m, strict=True)
+    # A box of unknown size is as deep as it is long.
+    half = tuple(one.size_m[1] / 2 if one.size_m else length for one, length in each)
+    return replace(scene.surroundings, half_depth_m=half, beside_m=scene.z_m)
 
 
 def in_space(position_m: Array, velocity_m_s: Array, beside_m: Array) -> Poses:

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtri
 
-from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import in_units
-from galileo_jax.runtime.latin_hypercube import latin_hypercube
+from galileo_jax.numerics.latin_hypercube import latin_hypercube
 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
@@ -97,7 +96,7 @@ def _changes(
     """The base fit's whitened residuals, and how they change to each of `probes`."""
     here = trials.theta(base.z, base.free)
     scale = here[len(trials.model_parameters) :]
-    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
+    white = np.concatenate(trials.whitened(np.vstack([here, probes]), scale), axis=1)
     return white[0], white[1:] - white[:1]
 
 

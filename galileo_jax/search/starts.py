@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import LongTailed, Prior, inverse
-from galileo_jax.runtime.latin_hypercube import latin_hypercube
+from galileo_jax.numerics.latin_hypercube import latin_hypercube
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.score_tests import (
     SHOWS,

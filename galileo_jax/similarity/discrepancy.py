@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.numerics.random_patterns import SMALLEST, alone, random_patterns
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import SMALLEST, alone, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
 from galileo_jax.similarity.rocking_discrepancy import rocking, rocking_frames, rocking_steps
 

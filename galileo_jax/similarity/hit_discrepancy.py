@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galileo_jax.numerics.random_patterns import alone, random_patterns
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import alone, random_patterns
 from galileo_jax.statespace.kinematics import STILL_M_S, first_moved
 
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel

@@ -10,10 +10,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.numerics.line_segments import nearest_frames
+from galileo_jax.numerics.random_patterns import alone
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import alone
 from galileo_jax.similarity.discrepancy import (
     WOBBLE_S,
     WOBBLE_SD_M,
@@ -46,7 +46,7 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             hits += [(int(np.argmin(apart)), i), (int(np.argmin(apart)), j)]
     for i, ends in product(range(len(position)), scene.walls_m):
         half_m = scene.half_length_m[i]
-        at_wall = bounces(position[i, :2], observation.mask[i], ends, half_m)
+        at_wall = nearest_frames(position[i, :2], observation.mask[i], ends, half_m)
         hits += [(frame, i) for frame in at_wall]
     for hit, i in hits:
         later = slice(hit + 1, None)

@@ -10,8 +10,8 @@ turn, does not know: these frames say little, and where it goes on from is not q
 import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.numerics.random_patterns import alone
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import alone
 
 RISES_M = 1.2e-3  # three times what bodies wobble across their path (`discrepancy.WOBBLE_SD_M`)
 CLEAR = 5.0  # standard deviations of a frame

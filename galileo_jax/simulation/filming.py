@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.model.scene.scene import extents
+from galileo_jax.clip.sizes import extents
 from galileo_jax.runtime import progress
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.settings import Settings

@@ -9,6 +9,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
+from galileo_jax.clip.sizes import extents
 from galileo_jax.model.effects.air import expected_added_mass
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws import LAWS
@@ -16,7 +17,6 @@ from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
-from galileo_jax.model.scene.scene import extents
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2

@@ -11,9 +11,10 @@ import numpy as np
 from galileo_jax.clip.fields import Shape
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
+from galileo_jax.clip.sizes import extents, rolling
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.model.scene.scene import extents, rolling, start_paths
+from galileo_jax.model.scene.scene import start_paths
 from galileo_jax.runtime.errors import InputError
 
 NONE = "none"  # hidden

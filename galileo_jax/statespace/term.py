@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.numerics.random_patterns import random_patterns
 from galileo_jax.observation.observation import Observation
-from galileo_jax.observation.random_patterns import random_patterns
 from galileo_jax.runtime.registry import Registry
 from galileo_jax.statespace.kinematics import Kinematics
 

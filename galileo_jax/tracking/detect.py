@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from galileo_jax.observation.least_squares import polynomial
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation

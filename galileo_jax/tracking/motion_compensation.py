@@ -30,7 +30,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
-from galileo_jax.observation.observation import stretches
+from galileo_jax.numerics.runs import stretches
 from galileo_jax.tracking.noise import has_moved
 
 STEPS_PER_PX = np.array([1.0, 2.0, 4.0])

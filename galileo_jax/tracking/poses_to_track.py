@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
-from galileo_jax.observation.observation import stretches
+from galileo_jax.numerics.runs import stretches
 from galileo_jax.tracking.fragments import Piece
 from galileo_jax.tracking.motion_compensation import Coding, without_coding_shift
 from galileo_jax.tracking.noise import (

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from galileo_jax.observation.least_squares import least_squares, polynomial
-from galileo_jax.observation.observation import stretches
+from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.runs import stretches
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.noise import motion_variance, sudden
 from galileo_jax.tracking.pose import length

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.observation.least_squares import polynomial
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.tracking.pose import length
 
 SCENE_FRAMES = 15  # evenly over the film, show the scene: what is elsewhere in most is not in it

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.fit import FitOptions, checkpoint_identity, chosen_effects
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import build_good_track

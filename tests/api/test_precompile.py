@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from galileo_jax.api import precompile
-from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.inference.fits.residuals import Residuals
 from tests.oracle_run import HIT, make_run
 

@@ -12,12 +12,12 @@ from scipy.special import ellipj, ellipk
 
 from galileo_jax.api.fit import fit
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_problem
+from galileo_jax.assembly.build_scene import build_scene
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import build_scene
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.errors import InputError
 from tests.precision import in_64_bit

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_problem
+from galileo_jax.assembly.expected import expected
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command, compare, diagnose, fit, predict
 from galileo_jax.commands import simulate as simulate_command
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.parameters import Normal, absent
-from galileo_jax.model.scene.expected import expected
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.errors import InputError

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.air import AIR_KG_M3

@@ -8,10 +8,10 @@ import pytest
 
 from galileo_jax.api import diagnose as api
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.restricted_fit import fit_among
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects

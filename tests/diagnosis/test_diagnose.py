@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import yaml
 
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.diagnosis import diagnose as diagnose_module
 from galileo_jax.diagnosis.diagnose import diagnose
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip, kind_of
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.report.diagnosis_text import each_clip as told
 from galileo_jax.search.fit import best_fit

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.diagnosis.friction_along_way import SHOWN, friction_along_way
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.search.imperfect import fit_worlds
 
 ANGLE, K, NOISE_M, FPS, G = np.radians(25.0), 0.2, 1e-4, 60.0, 9.81

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.laws.fit_formulas import FittedLaw, _with_laws, without_twins
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, class_source, name_of
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.model.parameters import inverse
 from galileo_jax.search.hypothesis import Hypothesis

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_cases import EXOTIC_FILE
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.missing_force import infer_missing_force, views_of
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import State, Surroundings

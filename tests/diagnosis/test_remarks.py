@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.candidates import candidates_of
@@ -12,7 +13,6 @@ from galileo_jax.diagnosis.diagnosis import Verdict
 from galileo_jax.diagnosis.reasons import because
 from galileo_jax.diagnosis.remarks import shares_of_seconds, with_known_constants, with_second
 from galileo_jax.diagnosis.stakes import VerdictStakes
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects

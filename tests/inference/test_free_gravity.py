@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import yaml
 
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.fit_posterior import laplace_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.log_posterior import density_of
@@ -155,7 +154,7 @@ def test_a_place_is_the_same_in_all_clips():
     z[trials.names.index("friction_patch")] = 1.0
     z[where] = 0.4
     found = Residuals(trials).whites(batch(trials, z, np.ones(len(z), bool)))
-    expected = whitened(trials, trials.theta(z)[None], np.ones(2))
+    expected = trials.whitened(trials.theta(z)[None], np.ones(2))
     for own, joint in zip(found, expected, strict=True):
         assert np.sum(own**2) == pytest.approx(np.sum(joint**2), rel=BETWEEN_PROGRAMS)
 

@@ -5,8 +5,8 @@ import pytest
 
 from galileo_jax.inference.fit_posterior import laplace_posterior, two_solutions
 from galileo_jax.inference.fits.laplace import Code, GradientFit
-from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.numerics.normal_matrix import symmetric_root
 
 TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 4)))[0]
 

@@ -29,8 +29,8 @@ from galileo_jax.inference.toss.residuals import (
     times,
 )
 from galileo_jax.measurement.measure import measure
-from galileo_jax.measurement.toss_flight import flight_of, resting_height_m
 from galileo_jax.observation.poses import Poses
+from galileo_jax.observation.toss_flight import flight_of, resting_height_m
 from galileo_jax.rollout.body import box, thrown
 from galileo_jax.rollout.engine_body import roll_out
 from galileo_jax.runtime.errors import InputError

@@ -9,11 +9,11 @@ import yaml
 
 import galileo_jax as gx
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.walls import bounces
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
 from galileo_jax.measurement.segments.segments import RESTS, STRUCK
+from galileo_jax.numerics.line_segments import nearest_frames
 
 FPS = 120.0
 
@@ -34,7 +34,7 @@ def test_a_wall_that_nobody_declared_ends_the_clip(tmp_path: Path, seed: int) ->
         frame
         for i, item in enumerate(clip.objects)
         for wall in clip.walls
-        for frame in bounces(
+        for frame in nearest_frames(
             seen.position_m[i, :2], seen.mask[i], wall.ends_m, (item.size_m or (0.0,))[0]
         )
     )

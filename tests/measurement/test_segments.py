@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import inferred, measure
 from galileo_jax.measurement.segments.blow import arrest_frame, blow_frame
 from galileo_jax.measurement.segments.handling import hand_frame

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.fit import fit
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.start_speed import start_speed
 from galileo_jax.observation.observation import Observation

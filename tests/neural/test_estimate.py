@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR

@@ -7,7 +7,8 @@ import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.measurement.in_metres import observe
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 

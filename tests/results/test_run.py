@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from galileo_jax.assembly.build_problem import noise_of
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.inference.build_problem import noise_of
 from tests.ramp_model import HIT, make_surroundings
 
 SCENE = make_surroundings(HIT)

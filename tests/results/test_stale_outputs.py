@@ -11,13 +11,9 @@ from galileo_jax.api.fit_result import Found, make_fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.observation.digest import digest
 from galileo_jax.results.run import Run, load_run
-from galileo_jax.results.stale_outputs import (
-    TRACKS,
-    digest,
-    remove_stale_prediction,
-    stale_documents,
-)
+from galileo_jax.results.stale_outputs import TRACKS, remove_stale_prediction, stale_documents
 from tests.oracle_run import HIT, make_run
 from tests.precision import in_64_bit
 

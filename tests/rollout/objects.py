@@ -6,10 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.clip.schema import ClipObject
+from galileo_jax.clip.sizes import extents, rolling
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import Scene, extents, rolling, start_paths
+from galileo_jax.model.scene.scene import Scene, start_paths
 from galileo_jax.rollout.engine_path import EnginePath
 
 BOX = ClipObject(name="box", shape="box", size_m=(0.06, 0.06, 0.06))

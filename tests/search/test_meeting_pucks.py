@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.search.moves.prefix import phases
 

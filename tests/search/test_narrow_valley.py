@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.thresholds import DECISIVE
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import make_effects

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.laws.fit_formulas import _with_laws
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, class_source, name_of
 from galileo_jax.diagnosis.stakes import VerdictStakes, log_prior
 from galileo_jax.diagnosis.thresholds import DECISIVE
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import SETTLED_IN_TURN_NATS, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects

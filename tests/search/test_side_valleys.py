@@ -8,9 +8,9 @@ from scipy.special import ndtr
 
 import galileo_jax as gx
 from benchmarks.side_valleys import draw_scene, from_truth
+from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior, laplace_posterior
 from galileo_jax.inference.fits.descent import ends_of, in_valley, valleys
 from galileo_jax.inference.fits.gradient import Code, GradientFitter

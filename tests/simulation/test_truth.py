@@ -122,9 +122,9 @@ def test_what_is_declared():
 @pytest.mark.parametrize("name", ["frame_rate", "ramp_angle", "release_delay", "scale_error"])
 def test_the_library_mends_what_simulate_hides(name, tmp_path, x64):
     """The effect at its true value explains the clip that a user gets; without it nothing does."""
+    from galileo_jax.assembly.build_scene import build_scene
     from galileo_jax.inference.problem import Problem
     from galileo_jax.model.model import Model
-    from galileo_jax.model.scene.scene import build_scene
     from galileo_jax.rollout.engines import make_engine
 
     path = tmp_path / "clip.csv"

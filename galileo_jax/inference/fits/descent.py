@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.kernels import Quadratic, propose
-from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.residuals import (
     POINTS,
     Batch,
@@ -27,6 +26,7 @@ from galileo_jax.inference.fits.residuals import (
     quadratic,
 )
 from galileo_jax.inference.joint_problem import NOISE_SD
+from galileo_jax.numerics.normal_matrix import inverse
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, one_at_a_time
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 

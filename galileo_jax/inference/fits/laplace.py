@@ -9,10 +9,10 @@ from jaxtyping import Bool, Float
 
 from galileo_jax.inference.fits.descent import Polished
 from galileo_jax.inference.fits.kernels import FAILED
-from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
+from galileo_jax.numerics.normal_matrix import inverse
 from galileo_jax.similarity.noise_scale import errors_at
 from galileo_jax.statespace.sizes import Sizes
 

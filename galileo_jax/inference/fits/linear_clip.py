@@ -30,11 +30,11 @@ from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.importance_sampling import WeighedDraws
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.fits.t_proposal import Cloud
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.resampled import resampled
+from galileo_jax.numerics.normal_matrix import inverse, symmetric_root
 from galileo_jax.similarity.gaussian_likelihood import is_measured
 from galileo_jax.statespace.sizes import Sizes
 from galileo_jax.statespace.term import Term

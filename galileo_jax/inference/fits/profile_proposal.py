@@ -22,10 +22,10 @@ from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.fits.residuals import Residuals, quadratic
 from galileo_jax.inference.fits.t_proposal import Points, Values, log_student_t, student_t
 from galileo_jax.inference.fits.transport_map import Valley
+from galileo_jax.numerics.normal_matrix import symmetric_root
 
 BENT = 3.0  # standard deviations of a stiffer direction, one along a direction: a map follows less
 STEP, MOST_STEPS = 0.5, 10  # standard deviations along the way; to each side

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import gammaln
 
-from galileo_jax.inference.fits.normal_matrix import symmetric_root
+from galileo_jax.numerics.normal_matrix import symmetric_root
 
 FREEDOM = 5.0  # degrees of it, of Student's t
 POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count

@@ -25,8 +25,8 @@ from galileo_jax.inference.toss.residuals import (
     forward,
     left_over,
 )
-from galileo_jax.measurement.toss_flight import Flight, flight_of, resting_height_m
 from galileo_jax.observation.poses import Poses
+from galileo_jax.observation.toss_flight import Flight, flight_of, resting_height_m
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 

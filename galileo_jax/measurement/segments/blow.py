@@ -4,8 +4,9 @@ import numpy as np
 from jaxtyping import Bool
 from scipy import special
 
-from galileo_jax.observation.least_squares import least_squares, polynomial
-from galileo_jax.observation.observation import Observation, PointPath, stretches
+from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.runs import stretches
+from galileo_jax.observation.observation import Observation, PointPath
 
 HIT_M_S2 = 20.0  # two g
 SHARE = 0.3

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.measurement.segments.blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame, jumps
+from galileo_jax.numerics.line_segments import distance_to_segment
 from galileo_jax.observation.observation import Observation
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other
@@ -60,7 +60,7 @@ def _has_partner(clip: Clip, observation: Observation, i: int, frames: slice) ->
     if not np.isfinite(own).all():
         return True
     reach = NEAR * radii[i] + np.linalg.norm(np.diff(place[i]), axis=0).max() / 2
-    if any(distance_to_wall(own.T, wall.ends_m).min() < reach for wall in clip.walls):
+    if any(distance_to_segment(own.T, wall.ends_m).min() < reach for wall in clip.walls):
         return True
     return any(
         j != i and not np.linalg.norm(_on_way(other) - own, axis=0).min() > reach + NEAR * radii[j]

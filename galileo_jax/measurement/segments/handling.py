@@ -18,7 +18,7 @@ exactly the parabola of what follows tells, back to the first frame that it does
 import numpy as np
 
 from galileo_jax.measurement.segments.blow import continues
-from galileo_jax.observation.least_squares import least_squares
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0

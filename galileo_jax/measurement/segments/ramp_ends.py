@@ -32,7 +32,7 @@ Half = tuple[float, float]  # of an object's length along the travel and of its 
 
 def ramp_end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
     """The last frame before the first of these ends, whose it is, and why; None where none is."""
-    from galileo_jax.model.scene.scene import extents
+    from galileo_jax.clip.sizes import extents
 
     halves = [extents(item) if item.size_m is not None else None for item in clip.objects]
     found = [(_return_frame(observation, halves[0]), 0, RETURNS)]

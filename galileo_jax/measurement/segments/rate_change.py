@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from galileo_jax.observation.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares, polynomial
 from galileo_jax.observation.observation import Observation, PointPath
 
 LEAST, CLEAR = 1.5, 4.0  # factor of the velocity; standard deviations

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from galileo_jax.observation.observation import Observation, PointPath, stretches
+from galileo_jax.numerics.runs import stretches
+from galileo_jax.observation.observation import Observation, PointPath
 
 STILL_S, FEWEST = 0.3, 9
 STILL, CLEAR = 1e-3, 5.0

@@ -33,8 +33,8 @@ from galileo_jax.measurement.segments.foreign_impact import stranger_frame
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
 from galileo_jax.measurement.segments.rate_change import rate_change
 from galileo_jax.measurement.segments.track_failure import Astray, find_astray
-from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.toss_flight import last_free_frame
 from galileo_jax.tracking.track import Track
 
 STOPPED = "is stopped by something that is not in the scene"

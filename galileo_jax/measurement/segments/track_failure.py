@@ -19,9 +19,9 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.measurement.segments.blow import jumps
 from galileo_jax.measurement.segments.foreign_impact import STEPS_ON_WAY
+from galileo_jax.numerics.line_segments import distance_to_segment
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
@@ -152,7 +152,7 @@ def _may_meet(
     size = _size_m(clip.objects[i])
     if SCENARIOS[clip.scenario].has_table and abs(places_m[0]).min() < NEAR * size + reach_m:
         return True
-    to_walls = (distance_to_wall(places_m.T, wall.ends_m).min() for wall in clip.walls)
+    to_walls = (distance_to_segment(places_m.T, wall.ends_m).min() for wall in clip.walls)
     if any(away < NEAR * size / 2 + reach_m for away in to_walls):
         return True
     for j, other in enumerate(clip.objects):

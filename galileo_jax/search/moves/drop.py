@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import in_units
+from galileo_jax.numerics.normal_matrix import inverse
 from galileo_jax.search.hypothesis import Hypothesis, reduced
 from galileo_jax.search.starts import positive_nuisances
 from galileo_jax.search.table import Start, Table

@@ -13,13 +13,13 @@ from itertools import combinations, product
 
 import numpy as np
 
-from galileo_jax.clip.walls import bounces
 from galileo_jax.inference.fits.descent import ends_of, valleys
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.laws.pucks import START
+from galileo_jax.numerics.line_segments import nearest_frames
+from galileo_jax.numerics.normal_matrix import inverse
 from galileo_jax.search.starts import absent_z, scattered_round
 from galileo_jax.search.table import Start, Table
 
@@ -101,7 +101,9 @@ def _bounces(problem: Problem) -> list[int]:
     seen, scene = problem.observation, problem.model.scene.surroundings
     found = set()
     for i, ends in product(range(len(seen.names)), scene.walls_m):
-        found |= {*bounces(seen.position_m[i, :2], seen.mask[i], ends, scene.half_length_m[i])}
+        found |= {
+            *nearest_frames(seen.position_m[i, :2], seen.mask[i], ends, scene.half_length_m[i])
+        }
     return sorted(frame for frame in found if frame >= LEAST_FRAMES)
 
 

@@ -9,10 +9,10 @@ import pytest
 from scipy import stats
 
 import galileo_jax as gx
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.library.added_mass import PRIOR

@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from galileo_jax.api.fit import fit
+from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
-from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import measure
 
 G, FPS, NOISE_M, BETA = 9.81, 60.0, 3e-4, 0.5

@@ -13,7 +13,7 @@ from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.model.effects.nuisances.start_offset import StartOffset
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from tests.ramp_model import HIT, make_surroundings
 
 RAMP = make_surroundings(HIT)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.expected import DISTANCE, EYE_M, pitched
 from galileo_jax.model.effects.effect import FALL_LENGTH
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.parameters import Normal
-from galileo_jax.model.scene.expected import DISTANCE, EYE_M, pitched
 from tests.model.effects.test_nuisances import INCLINE
 
 TOP_M, LENGTH_M = 40.0, 30.0

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.build_scene import build_scene
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
-from galileo_jax.model.scene.scene import build_scene
 
 HELD_S = 0.4
 YAML = """\

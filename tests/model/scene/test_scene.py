@@ -6,10 +6,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from galileo_jax.assembly.build_scene import build_scene
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.sizes import extents
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import build_scene, extents
 from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.motion import to_plane

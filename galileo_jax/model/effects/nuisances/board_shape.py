@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 
 from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings
 from galileo_jax.model.effects.effect import Theta as Theta
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 
 LENGTH = "board_length"  # in `Surroundings.expected`: of the part that is seen, as measured
 MOST = 5  # of n

@@ -7,7 +7,7 @@ scale * (sin a - k cos a) shows, and neither it nor k can be determined.
 """
 
 from galileo_jax.model.effects import Effect, LogNormal, Parameter
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 
 
 class PixelScale(Effect, where=lambda scene: not (scene.is_scale_known or scene.is_level)):

@@ -1,5 +1,6 @@
-"""Linear least squares, and the straight line through points."""
+"""Linear least squares, and the straight line and the circle through points."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -56,3 +57,14 @@ def line_through(points: Float[np.ndarray, "2 point"]) -> Line:
     farthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
     along = axes[:, 1] if axes[:, 1] @ farthest >= 0 else -axes[:, 1]
     return Line(middle, along, axes[:, 0], (max(float(values[0]), 0.0), float(values[1])))
+
+
+def circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
+    """The circle through points `[frame]` by linear least squares: its centre and radius.
+
+    Source: Kasa (1976), A circle fitting procedure and its error analysis.
+    """
+    design = np.stack([x, y, np.ones_like(x)], axis=1)
+    a, b, c = np.linalg.lstsq(design, x**2 + y**2)[0]
+    square = c + (a**2 + b**2) / 4
+    return (a / 2, b / 2), math.sqrt(square) if square > 0 else math.inf

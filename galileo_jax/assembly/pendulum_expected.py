@@ -6,12 +6,13 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
+from galileo_jax.numerics.least_squares import circle
+from galileo_jax.numerics.periodogram import period_s
 
 LENGTH_SD, ANGLE_SD_RAD = 0.3, 0.15  # of its logarithm; of what the path tells
 SPEED_SD = 0.3  # of the speed of a fall through the length
 TAPE_M, PLACE_M = 0.002, 0.01  # how well a thread, and a pivot in the picture, are measured
 WIDE_RAD = 0.3  # of a path whose circle shows where the pivot is
-MANY_PERIODS = 400  # tried
 
 
 def pendulum_expected(
@@ -52,30 +53,3 @@ def pendulum_expected(
         ANGLE: (angle, angle_sd),
         "start_speed": (along * length / radius, SPEED_SD * fall),
     }
-
-
-def circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
-    """The circle through points `[frame]` by linear least squares: its centre and radius.
-
-    Source: Kasa (1976), A circle fitting procedure and its error analysis.
-    """
-    design = np.stack([x, y, np.ones_like(x)], axis=1)
-    a, b, c = np.linalg.lstsq(design, x**2 + y**2)[0]
-    square = c + (a**2 + b**2) / 4
-    return (a / 2, b / 2), math.sqrt(square) if square > 0 else math.inf
-
-
-def period_s(times_s: np.ndarray, place_m: np.ndarray) -> float:
-    """The period of the sine that leaves least over, s (a least-squares periodogram)."""
-    if len(times_s) < 5:
-        return 1.0
-    span = float(times_s[-1] - times_s[0])
-    step = float(np.median(np.diff(times_s)))
-    periods = np.geomspace(3 * step, 2 * span, MANY_PERIODS)
-    left = []
-    for period in periods:
-        turn = 2 * math.pi * (times_s - times_s[0]) / period
-        design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
-        solution = np.linalg.lstsq(design, place_m, rcond=None)[0]
-        left.append(np.sum((place_m - design @ solution) ** 2))
-    return float(periods[np.argmin(left)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
+from galileo_jax.numerics.normal_matrix import inverse, symmetric_root
 
 
 def test_it_is_the_inverse():

@@ -6,8 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
-from galileo_jax.clip.walls import Wall, distance_to_wall
+from galileo_jax.clip.walls import Wall
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
+from galileo_jax.numerics.line_segments import distance_to_segment
 from galileo_jax.observation.observation import Observation
 
 FRAMES = 8  # through which a straight line is laid
@@ -86,6 +87,6 @@ def _first_hit(observation: Observation, own: int, walls: Sequence[Wall]) -> int
         if (both := mask[i] & mask[j]).any():
             nearest.append(int(np.argmin(np.where(both, apart, np.inf))))
     for wall in walls:
-        away = distance_to_wall(np.moveaxis(place[own], 0, -1), wall.ends_m)
+        away = distance_to_segment(np.moveaxis(place[own], 0, -1), wall.ends_m)
         nearest.append(int(np.argmin(np.where(mask[own], away, np.inf))))
     return min(nearest)

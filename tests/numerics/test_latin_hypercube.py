@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from galileo_jax.runtime.latin_hypercube import latin_hypercube
+from galileo_jax.numerics.latin_hypercube import latin_hypercube
 
 
 @pytest.mark.parametrize(("points", "axes", "seed"), [(24, 7, 0), (5, 1, 3)])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.observation.least_squares import polynomial
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.observation.poses import Poses
 
 NEAR_SHARE = 0.06  # of the edge: a lowest corner nearer to the plane may touch it in the next frame

@@ -11,18 +11,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from galileo_jax.assembly.board_path import board_shape
+from galileo_jax.assembly.level_starts import level_starts
+from galileo_jax.assembly.pendulum_expected import pendulum_expected
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sizes import volume_m3
 from galileo_jax.model.effects.air import expected_added_mass, expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
 from galileo_jax.model.effects.laws.start_velocity import LAUNCH, StartVelocity
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
-from galileo_jax.model.scene.board_path import board_shape
-from galileo_jax.model.scene.level_starts import level_starts
-from galileo_jax.model.scene.pendulum_expected import pendulum_expected, period_s
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.numerics.periodogram import period_s
+from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.observation.observation import Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
 START_SD_M_S = 1.0
@@ -176,22 +179,6 @@ def _density_ratio(clip: Clip) -> tuple[float, float]:
     if clip.liquid_density is None or declared.mass_kg is None or volume is None:
         return DENSITY_RATIO
     return clip.liquid_density * volume / declared.mass_kg, WEIGHED_RATIO_SD
-
-
-def volume_m3(declared: ClipObject) -> float | None:
-    """Of an object; None where its size is not known."""
-    size = declared.size_m
-    if size is None:
-        return None
-    match declared.shape:
-        case "box":
-            return math.prod(size)
-        case "cylinder":
-            return math.pi * size[0] ** 2 * size[1]
-        case "torus":
-            return 2 * math.pi**2 * size[0] * size[1] ** 2
-        case "sphere":
-            return 4 / 3 * math.pi * size[0] ** 3
 
 
 def _floor_height(clip: Clip, y_m: np.ndarray, half_height_m: float) -> tuple[float, float]:

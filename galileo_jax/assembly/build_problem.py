@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from galileo_jax.assembly.build_scene import build_scene
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.joint_problem import JointProblem
@@ -12,7 +13,6 @@ from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.nuisances import NUISANCES
 from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import build_scene
 from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.errors import InputError

@@ -1,0 +1,1 @@
+"""Linear algebra and geometry that knows nothing of clips, models, or fits."""
