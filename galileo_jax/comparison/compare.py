@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtr
 
-from galileo_jax.comparison.bootstrap import replicates, whitened
+from galileo_jax.comparison.bootstrap import replicates
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
@@ -143,7 +143,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     if trials.sizes is not None:  # errors beyond the independent ones have sizes of their own
         judged_range = (min(float(fitted.min()), 1.0), JUDGED_SCALE_RANGE[1])
     scales = np.clip(fitted, *judged_range)
-    measured = whitened(trials, theta[None], scales)
+    measured = trials.whitened(theta[None], scales)
     sizes = [
         fitted_mode_size(white[0], scale, problem.data, problem.errors_in_full)
         for white, scale, problem in zip(measured, scales, trials.problems, strict=True)

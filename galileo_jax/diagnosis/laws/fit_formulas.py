@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.laws.formula_interpreter import MOST_NUMBERS, ActingFormulas, Spare
 from galileo_jax.diagnosis.laws.grammar import (
     Structure,
@@ -142,7 +141,7 @@ def without_twins(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
 def _motion(law: FittedLaw, first: FittedLaw) -> np.ndarray:
     """What a law's fit leaves of the tracks, `[value]`, in units of the noise of the first's."""
     scale = first.theta[-len(law.trials.problems) :]
-    return np.concatenate(whitened(law.trials, law.theta[None], scale), axis=1)[0]
+    return np.concatenate(law.trials.whitened(law.theta[None], scale), axis=1)[0]
 
 
 def _simpler(law: FittedLaw) -> list[Suggestion]:
