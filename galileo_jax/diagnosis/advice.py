@@ -3,7 +3,7 @@
 from galileo_jax.comparison.phases import free_phase
 from galileo_jax.diagnosis.diagnosis import Verdict
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.model.effects.forms import FORM_MEANINGS
+from galileo_jax.model.effects.forms import FORM_BY_NAME
 
 # How another run gets other speeds and places, by how the objects move.
 ANOTHER_RUN = {
@@ -68,7 +68,7 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     """Sentences for the user: what would tell more. Empty where nothing is open."""
     if verdict.status == "unknown":
         form = verdict.form
-        known = () if form is None else (f"it looks like {FORM_MEANINGS[form]} ({form})",)
+        known = () if form is None else (f"it looks like {FORM_BY_NAME[form].meaning} ({form})",)
         if any(why.rule in OPEN for why in verdict.reasons):
             known = (
                 *known,
@@ -99,8 +99,8 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
         for group, how in groups
         if len(named & group) > 1
     ]
-    if forms := named & set(FORM_MEANINGS):
-        meant = " or ".join(FORM_MEANINGS[form] for form in sorted(forms))
+    if forms := named & set(FORM_BY_NAME):
+        meant = " or ".join(FORM_BY_NAME[form].meaning for form in sorted(forms))
         said.append(
             f"it may also be {meant}: {again}; an effect of a place stays in its place, an "
             "effect of the speed moves with the speed"

@@ -20,7 +20,7 @@ from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
-from galileo_jax.model.effects.forms import FORM_SHAPES
+from galileo_jax.model.effects.forms import FORM_BY_NAME
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.table import Entry, Table
 
@@ -66,7 +66,8 @@ def law_candidates(
     among the ranked `fitted` is tried, too, with its constants free.
     """
     made = []
-    wanted = [FORM_SHAPES[c.effects[0]] for c in fitted[:1] if c.family is not None]
+    forms = [FORM_BY_NAME[c.effects[0]] for c in fitted[:1] if c.family is not None]
+    wanted = [(form.family, form.nature, form.is_on_all) for form in forms]
     for law in fitted_laws(table.trials, near, views, wanted, on_stage):
         values = {name: f"{value:.4g}" for name, value in law.constants().items()}
         odds = law_odds(len(law.structure.factors))

@@ -2,7 +2,7 @@
 
 1. Fit the model without effects; compare it with the data. Where nothing moves, that is all.
 2. Search for every effect of the library beside it, and for the forms without a physical name
-   (`galileo_jax.search`, `model/effects/forms`). Rank all by log odds: the evidence, which charges
+   (`galileo_jax.search`, `effects/forms.py`). Rank all by log odds: the evidence, which charges
    for every parameter, and the prior, which charges for how many were tried. The model without
    effects will do and nothing convinces: the verdict is none.
 3. Compare the best with the data, too. Where none leaves only noise, it is asked whether

@@ -13,7 +13,7 @@ from scipy.special import softmax
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.each_clip import EachClip
 from galileo_jax.diagnosis.friction_along_way import Stretch
-from galileo_jax.model.effects.forms import FORM_FAMILIES, FORM_NAMES
+from galileo_jax.model.effects.forms import FORM_BY_NAME, FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 
 Status = Literal["none", "named", "ambiguous", "law", "unknown"]
@@ -95,7 +95,8 @@ class Candidate:
         """The shape of a law's or a form's formula; None of all else."""
         if self.law is not None:
             return self.law.family
-        return FORM_FAMILIES[self.effects[-1]] if self.is_form and len(self.effects) == 1 else None
+        is_one_form = self.is_form and len(self.effects) == 1
+        return FORM_BY_NAME[self.effects[-1]].family if is_one_form else None
 
 
 @dataclass(frozen=True)
