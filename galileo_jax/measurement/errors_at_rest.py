@@ -15,7 +15,7 @@ follows, averaged over tau by the likelihood with the place and v left open, v a
 rests have on average, as if one window more had shown it. Beside those that last each frame has an
 error of LEAST_SCALE of the stated one or more: a picture that a coder froze is no better known.
 What has come to rest is besides off by one shift of all its frames: however many there are, they do
-not average it out.
+not average it out. Of twice as long a rest before all motion, or after it, only `MOST` frames stay.
 
 Source: Patterson and Thompson (1971), Recovery of inter-block information when block sizes are
 unequal, Biometrika 58, 545 (the likelihood of covariances, without the mean).
@@ -44,6 +44,7 @@ CODED_ANEW = 2.0  # a step by so many of all others of a window
 MIN_WINDOWS = 20  # fewer do not tell a variance
 LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
 PIECE = 120  # frames whose likelihood is computed together
+MOST = 3 * PIECE  # frames of a rest before a motion, or after it: more tell nothing of it
 FRESH = 0.01  # of errors that last so much is another from frame to frame
 TAUS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # frames
 # Of the variance in motion, less what scatters at rest: what has come to rest is coded again, frame
@@ -58,6 +59,11 @@ Kinds = Float[np.ndarray, " kind"]
 def with_errors_at_rest(observation: Observation) -> Observation:
     """The observation with the covariance of what rests, in `modes_m` what frames share of it."""
     looks = [_look(observation, i) for i in range(len(observation.mask))]
+    far = [(i, part) for i, (rests, _) in enumerate(looks) for part in _far(observation, i, rests)]
+    if far:
+        for i, part in far:
+            observation = observation.without(part, i)
+        return with_errors_at_rest(observation)
     scatter = np.concatenate([own for _, own in looks])
     if not scatter.size:
         return observation
@@ -80,6 +86,19 @@ def with_errors_at_rest(observation: Observation) -> Observation:
                 mode[i, axis, rest] = pattern * sd
                 errors.append(mode)
     return replace(observation.with_modes(shifts, errors), covariance_m2=covariance)
+
+
+def _far(observation: Observation, i: int, rests: Sequence[slice]) -> list[slice]:
+    """What of the first and the last rest of an object is far from its motion."""
+    seen, found = np.flatnonzero(observation.mask[i]), []
+    for rest in rests:
+        if rest.stop - rest.start <= 2 * MOST:
+            continue
+        if rest.start <= seen[0] + SETTLES:
+            found.append(slice(rest.stop - MOST))
+        elif rest.stop > seen[-1]:
+            found.append(slice(rest.start + MOST, None))
+    return found
 
 
 def _shifts(

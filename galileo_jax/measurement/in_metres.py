@@ -135,18 +135,17 @@ def with_coding_errors(clip: Clip, observation: Observation, track: Track) -> Ob
     shifts = np.einsum("ofij,ofpj->opif", slope, track.shifts_px)
     shifts = np.where(observation.mask[:, None, None], shifts, 0.0)
     sd = np.sqrt(np.einsum("oiif->oif", observation.covariance_m2))
-    frames = np.arange(len(track.times_s))
-    wander = np.exp(-np.abs(frames[:, None] - frames) / LASTS_FRAMES)
     found = []
     for i, own in enumerate(shifts):
-        for shift in own:
-            relative = np.where(observation.mask[i], np.abs(shift) / sd[i], 0.0)
-            if relative.max() < NEGLIGIBLE:
+        seen = np.flatnonzero(observation.mask[i])
+        wander = np.exp(-np.abs(seen[:, None] - seen) / LASTS_FRAMES)
+        for shift in own[..., seen]:
+            if (np.abs(shift) / sd[i][:, seen]).max(initial=0.0) < NEGLIGIBLE:
                 continue
             size = np.linalg.norm(shift, axis=0)
             for pattern in random_patterns(size[:, None] * wander * size, FAINT):
                 mode = np.zeros_like(observation.position_m)
-                mode[i] = shift / np.where(size > 0, size, 1.0) * pattern
+                mode[i][:, seen] = shift / np.where(size > 0, size, 1.0) * pattern
                 found.append(mode)
     return observation.with_modes(errors=found) if found else observation
 

@@ -182,6 +182,7 @@ def _of_scene(clip: Clip, whole: Observation, segments: Segments, pixels: Track 
     is_there[: min(item.first_frame or 0 for item in clip.objects)] = False
     if pixels is not None:
         is_there[_left_picture(pixels) :] = False
+        is_there &= whole.mask.any(axis=0) | ~pixels.is_visible.any(axis=0)  # not in a long rest
     return int(is_there.sum())
 
 

@@ -5,7 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.errors_at_rest import LEAST_SCALE, with_errors_at_rest
+from galileo_jax.measurement.errors_at_rest import (
+    LEAST_SCALE,
+    MOST,
+    WINDOW,
+    with_errors_at_rest,
+)
 from galileo_jax.observation.observation import Observation
 
 FRAMES, SD_M = 120, 1e-4
@@ -199,3 +204,23 @@ def test_what_moves_within_a_frame_has_moved():
     """By more than a picture that is coded anew is off: that is no error, however quick it was."""
     cover = covariance_of(with_errors_at_rest(frozen(3, jump_m=50 * SD_M)), 0)
     assert np.sqrt(np.diag(cover).max()) < 2
+
+
+def test_what_is_far_from_motion_is_left_out_of_a_long_rest():
+    """Minutes of a film before its motion: their covariance would fill the memory."""
+    short = filmed(0.5)
+    rng, more = np.random.default_rng(5), 2000
+    start = short.position_m[..., :1] + 0.5 * SD_M * rng.standard_normal((1, 2, more))
+    whole = replace(
+        short,
+        times_s=np.arange(more + FRAMES) / 60,
+        position_m=np.concatenate([start, short.position_m], axis=-1),
+        covariance_m2=np.concatenate(
+            [np.tile(SD_M**2 * np.eye(2)[None, ..., None], (1, 1, 1, more)), short.covariance_m2],
+            axis=-1,
+        ),
+        mask=np.ones((1, more + FRAMES), bool),
+    )
+    found = with_errors_at_rest(whole)
+    assert MOST <= found.mask[0, :-60].sum() < MOST + 2 * WINDOW
+    assert found.mask[0, -60 - MOST // 2 :].all(), "the last of it, and all of the motion"
