@@ -4,7 +4,7 @@ import contextlib
 import math
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,13 @@ LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
 # Of a scale that is a thing's length in the picture, whose ends are where its texture seems to
 # end: as much as the scale's key allows, a fifth, once it is rounded.
 SIZE_SD_SHARE = 0.19
+OPTIONS = {
+    "scenario": "--scenario",
+    "ramp_angle_deg": "--ramp-angle",
+    "pixels_per_metre": "--pixels-per-metre",
+    "track_units": "--track-units",
+    "fps": "--fps",
+}
 NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
 
 
@@ -95,13 +102,13 @@ def check_answered(known: Understood, answers: Answers) -> None:
     missing = [one for one in questions(known, answers) if one.is_open]
     if not missing:
         return
-    options = " ".join(one.option for one in missing)
+    options = " ".join([*_given(answers), *(one.option for one in missing)])
     call = f"galileo {shlex.quote(str(known.source))} {options}"
     if known.is_film and known.unseen and missing[0].key == "points":
         raise InputError(
             f"{known.source}: {known.unseen}; film with a camera that rests, from before the "
-            "motion to its end, or say where in the first picture the thing is, and what else "
-            f"does not show: {call}"
+            "motion to its end, or say where in the first picture the middle of the thing is, in "
+            f"pixels, and what else does not show: {call}"
         )
     keys = ", ".join(f"{one.key} ({one.why})" for one in missing)
     name = known.yaml_path.name
@@ -110,6 +117,15 @@ def check_answered(known: Understood, answers: Answers) -> None:
         f"{known.source}: {unsaid} what the file does not show: {keys}; write it there, or say it "
         f"in the call, such as: {call}"
     )
+
+
+def _given(answers: Answers) -> Iterator[str]:
+    """What was said already, as options of a call."""
+    for key, option in OPTIONS.items():
+        if (value := answers.get(key)) is not None:
+            yield f"{option} {value:g}" if isinstance(value, float | int) else f"{option} {value}"
+    for x, y in answers.get("points") or ():
+        yield f"--point {x:g} {y:g}"
 
 
 def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
@@ -138,7 +154,7 @@ def _points(known: Understood) -> Question | None:
     ask = "Which thing is to be followed? "
     if not things:
         text = f"{ask}x y of its middle in the first picture, pixels"
-        return Question("points", text, known.unseen, "--point 312 221")
+        return Question("points", text, known.unseen, "--point X Y")
     why = f"{len(things)} things move: {'; '.join(listed_things(known))}"
     likeliest = list(things).index(known.likeliest) if known.likeliest else 0
     meant = list(things)[:2] if known.is_pair else [list(things)[likeliest]]

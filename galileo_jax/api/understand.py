@@ -17,6 +17,8 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import MAX_STEP_S
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.measurement.segments.rest import rests_of, runs_between
+from galileo_jax.observation.observation import PointPath
 from galileo_jax.report.marked_picture import Marked, write_marked_picture
 from galileo_jax.report.phrases import listed
 from galileo_jax.runtime import progress
@@ -33,6 +35,7 @@ HOW = {"a ": "along", "one coordinate": "in", "turns": "and", "an angle": "as"}
 
 PICTURE = "what_moves.png"
 USUAL_FPS = 30.0
+RUN = 0.2  # of the longest way between two rests: what goes less far is no motion of its own
 MOST_PICTURES = 6000
 """Of a film in which a motion is looked for: to look at one takes up to 10 ms, and nobody waits for
 more than a minute; 200 s of a phone's film, 25 s of slow motion."""
@@ -252,11 +255,33 @@ def _followed(known: Understood, point: Point) -> FilmPath:
         track = track_once(clip)
     except InputError:
         return FilmPath(None)
-    x, y = track.position_px[0][track.is_visible[0]].T
-    if len(x) < 3:
+    seen = np.flatnonzero(track.is_visible[0])
+    if len(seen) < 3:
         return FilmPath(None)
+    variance = np.trace(track.covariance_px2[0], axis1=-2, axis2=-1)[seen] / 2
+    path = PointPath(seen, track.times_s[seen], track.position_px[0][seen].T, variance)
+    x = path.place_m[0]
     direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
-    return FilmPath(likely_in_plane(x, y), direction, np.stack([x, y]))
+    return FilmPath(_likely_between_rests(path), direction, path.place_m)
+
+
+def _likely_between_rests(path: PointPath) -> Likely:
+    """The kind of motion between two rests: of the first run that is clearly one, or the longest.
+
+    A hand that puts the thing back, or takes it away, moves it, too.
+    """
+    runs = runs_between(rests_of(path), len(path))
+    ways = [path.place_m[:, first : last + 1] for first, last in runs]
+    lengths = [float(np.hypot(*np.ptp(way, axis=1))) for way in ways]
+    every = [
+        likely_in_plane(*way)
+        for way, length in zip(ways, lengths, strict=True)
+        if way.shape[1] >= 3 and length > RUN * max(lengths)
+    ]
+    if len(every) < 2:
+        return every[0] if every else likely_in_plane(*path.place_m)
+    first = next((one for one in every if one.is_clear), likely_in_plane(*path.place_m))
+    return replace(first, why=f"{first.why}; it moves {len(every)} times, with rests between")
 
 
 def sentence_of(known: Clip | Understood, answers: Answers) -> str:

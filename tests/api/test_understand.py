@@ -10,9 +10,10 @@ import yaml
 from galileo_jax.api.clips import load
 from galileo_jax.api.look import look
 from galileo_jax.api.proposed_clip import clip_of, write_yaml, yaml_of
-from galileo_jax.api.questions import parsed, questions
-from galileo_jax.api.understand import is_declared, understand
+from galileo_jax.api.questions import check_answered, parsed, questions
+from galileo_jax.api.understand import _likely_between_rests, is_declared, understand
 from galileo_jax.clip.schema import ClipFile
+from galileo_jax.observation.observation import PointPath
 from galileo_jax.runtime.errors import InputError
 from tests.tracking.moving_box import RELEASE, Box, film, throw
 
@@ -275,3 +276,22 @@ def test_a_film_in_which_nothing_moves_asks_for_a_point(tmp_path):
     assert asked[0].key == "points" and asked[0].default is None
     with pytest.raises(InputError, match="nothing moves in it; film with a camera that rests"):
         clip_of(known, {})
+
+
+def test_a_slide_before_a_hand_takes_the_thing_away_is_a_slide():
+    """It slides, rests at the board's end, and is carried round a bend to where it began."""
+    t = np.arange(150) / 30
+    slide = np.clip(t - 0.5, 0, 1) ** 2 * 300
+    carried = np.clip(t - 3.0, 0, 1) * 0.9 * np.pi
+    turn = 200 * np.stack([np.cos(carried) - 1, -np.sin(carried)])
+    place = np.stack([slide, 0.4 * slide]) + turn
+    place = place + 0.05 * np.random.default_rng(1).standard_normal(place.shape)
+    found = _likely_between_rests(PointPath(np.arange(150), t, place, np.full(150, 0.05**2)))
+    assert found.scenario == "incline" and found.is_clear
+    assert found.why.endswith("it moves 2 times, with rests between")
+
+
+def test_what_was_said_is_in_the_call_that_is_proposed(tmp_path):
+    film = filmed(tmp_path, np.tile([[50.0, 40.0, 0.0]], (20, 1)))
+    with pytest.raises(InputError, match="--scenario incline --point 50 40 --ramp-angle 20"):
+        check_answered(understand(film), {"scenario": "incline", "points": [(50.0, 40.0)]})

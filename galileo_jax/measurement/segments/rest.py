@@ -1,5 +1,7 @@
 """Rests: between which of them the run is that is meant, and after which nothing moves any more."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from galileo_jax.numerics.runs import stretches
@@ -25,11 +27,10 @@ def placed_frames(observation: Observation) -> tuple[int | None, int | None]:
     """
     path = observation.path()
     place_m = path.place_m
-    if len(path) < 2 * FEWEST or not (rests := stretches(_is_still(path))):
+    rests = rests_of(path)
+    if not rests:
         return None, None
-    # Between rests, and before the first and after the last of them.
-    ends = [0, *(edge for rest in rests for edge in (rest.start, rest.stop - 1)), len(path) - 1]
-    runs = list(zip(ends[::2], ends[1::2], strict=True))
+    runs = runs_between(rests, len(path))
     ways = np.array([place_m[:, last] - place_m[:, first] for first, last in runs])
     run = int(np.argmin(ways[:, 1]))
     if ways[run, 1] >= 0:
@@ -47,6 +48,17 @@ def placed_frames(observation: Observation) -> tuple[int | None, int | None]:
         None if before is None else carried(slice(before.start), before),
         None if after is None else carried(slice(after.stop, None), after),
     )
+
+
+def rests_of(path: PointPath) -> list[slice]:
+    """Where along a path, by numbers of its places, it is at rest."""
+    return stretches(_is_still(path)) if len(path) >= 2 * FEWEST else []
+
+
+def runs_between(rests: Sequence[slice], count: int) -> list[tuple[int, int]]:
+    """First and last place of each run between rests, before the first and after the last."""
+    ends = [0, *(edge for rest in rests for edge in (rest.start, rest.stop - 1)), count - 1]
+    return list(zip(ends[::2], ends[1::2], strict=True))
 
 
 def _is_still(path: PointPath) -> np.ndarray:
