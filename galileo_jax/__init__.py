@@ -17,8 +17,12 @@ Everything is imported when it is first used.
 # ruff: noqa: F401
 
 import ast
+import sys
 from importlib import import_module
+from importlib.abc import InspectLoader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -88,3 +92,26 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+class _Verbs(MetaPathFinder, InspectLoader):
+    """`python -m galileo_jax.VERB`: a module for each command, where no other has its name.
+
+    Imported, it is the public function of that name, which must not be hidden by a module.
+    """
+
+    def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
+        package, _, verb = fullname.rpartition(".")
+        is_verb = package == __name__ and (Path(__file__).parent / f"commands/{verb}.py").is_file()
+        return ModuleSpec(fullname, self) if is_verb else None
+
+    def get_source(self, fullname: str) -> str:
+        verb = fullname.rpartition(".")[2]
+        run = f"from galileo_jax.__main__ import cli; cli({verb!r})"
+        return f"if __name__ == '__main__': {run}"  # and not in a worker, which imports it
+
+    def exec_module(self, module: ModuleType) -> None:
+        sys.modules[module.__name__] = __getattr__(module.__name__.rpartition(".")[2])
+
+
+sys.meta_path.append(_Verbs())

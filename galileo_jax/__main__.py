@@ -1,7 +1,4 @@
-"""The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`.
-
-`galileo FILE ...` is `galileo explain FILE ...`.
-"""
+"""The console script: `galileo VERB ...`, or `galileo FILE ...` for `galileo explain FILE ...`."""
 
 import os
 import sys
@@ -9,12 +6,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from textwrap import indent
 
-import galileo_jax
 from galileo_jax import __version__
 from galileo_jax.commands import command
 from galileo_jax.commands.stop import end
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.jax_import import without_search_for_rocm
 from galileo_jax.runtime.known_names import did_you_mean
 
 VERBS = (
@@ -59,7 +54,6 @@ def main(argv: Sequence[str]) -> int | None:
         return 0
     # Read when NumPy is imported. Matrices here are small: its threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    without_search_for_rocm()
     if verb not in dict(VERBS):
         explain = import_module(f"galileo_jax.commands.{EXPLAIN}")
         if explain.looks_like_a_file(verb):
@@ -77,19 +71,9 @@ def _help() -> str:
     return f"{USAGE}\n\n{indent(command.in_columns(dict(VERBS)), '  ')}"
 
 
-def run_verb(name: str, verb: str) -> None:
-    """What a verb's module at the package's root does: `python -m galileo_jax.fit` and the like.
-
-    Imported, it gives the public function of the same name, which must not be hidden by a module.
-    """
-    if name == "__main__":
-        end(command.run(lambda words: main([verb, *words])))
-    sys.modules[name] = getattr(galileo_jax, verb)
-
-
-def cli() -> None:
-    """The console script's entry point."""
-    end(command.run(main))
+def cli(*verb: str) -> None:
+    """The console script's entry point, and that of `python -m galileo_jax.VERB`."""
+    end(command.run(lambda words: main([*verb, *words]), sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ class FitOptions:
     chains: int | None = None
     init: Literal["grad", "cnn"] = "grad"
     preset: Literal["galileo", "thesis"] = "galileo"
-    similarity: str = "thesis_gaussian"
+    similarity: Literal["earth_mover", "root_mean", "thesis_gaussian"] = "thesis_gaussian"
     acceptance: Literal["coin", "metropolis"] = "coin"
     selection: Literal["best", "least_variance"] = "best"
 

@@ -11,7 +11,6 @@ from galileo_jax.runtime.registry import entry_names
 
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 FREE = ", ".join(entry_names("galileo_jax.model.effects.free"))
-SIMILARITIES = entry_names("galileo_jax.thesis.similarities")
 
 
 def main(argv: Sequence[str]) -> None:
@@ -60,6 +59,5 @@ def _parser() -> VerbParser:
     add("max_steps")
     add("chains", type=whole_number(1))
     add("init", "preset")
-    add("similarity", choices=SIMILARITIES, metavar=None)
-    add("acceptance", "selection")
+    add("similarity", "acceptance", "selection")
     return parser

@@ -83,7 +83,7 @@ def metropolis_posterior(
             file = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
         return sample(
             jax.random.fold_in(key, 1) if is_second else key,
-            SAMPLERS.get(sampler).from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
+            SAMPLERS[sampler].from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
             density_of(trials, fit, valley),
             jnp.asarray(begin),
             trials.names,

@@ -33,7 +33,7 @@ class TrainConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preset: Annotated[str, AfterValidator(lambda name: PRESETS.get(name) and name)]
+    preset: Annotated[str, AfterValidator(lambda name: PRESETS[name] and name)]
     seed: Annotated[int, Field(ge=0)] = 0
     samples: Annotated[int, Field(ge=100)]
     validation_share: Share = 0.1

@@ -76,4 +76,4 @@ def make_task(config: "TrainConfig") -> "Task":
     Raises:
       InputError: the preset is unknown, or the config does not go with it.
     """
-    return PRESETS.get(config.preset)(config)
+    return PRESETS[config.preset](config)

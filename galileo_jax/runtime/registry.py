@@ -8,9 +8,9 @@ readers["tracker"]        imports the package the first time, and looks the name
 
 import importlib
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import did_you_mean
@@ -19,7 +19,7 @@ Entry = TypeVar("Entry")
 Registered = TypeVar("Registered")
 
 
-class Registry(Generic[Entry]):
+class Registry(Mapping[str, Entry]):
     """Things by their `name`: classes that have one, or instances.
 
     The modules that register them are imported when a name is first asked for.
@@ -67,7 +67,7 @@ class Registry(Generic[Entry]):
         self._load()
         return tuple(sorted(self._entries))
 
-    def get(self, name: str) -> Entry:
+    def __getitem__(self, name: str) -> Entry:
         """The entry of that name.
 
         Raises:
@@ -82,8 +82,6 @@ class Registry(Generic[Entry]):
             )
         return self._entries[name]
 
-    __getitem__ = get
-
     def __contains__(self, name: object) -> bool:
         return name in self.names()
 
@@ -92,14 +90,6 @@ class Registry(Generic[Entry]):
 
     def __len__(self) -> int:
         return len(self.names())
-
-    def values(self) -> tuple[Entry, ...]:
-        """All entries, by name."""
-        return tuple(self._entries[name] for name in self.names())
-
-    def items(self) -> tuple[tuple[str, Entry], ...]:
-        """All names and entries, by name."""
-        return tuple((name, self._entries[name]) for name in self.names())
 
     def _load(self) -> None:
         """Imports what registers entries.

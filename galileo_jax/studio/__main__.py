@@ -1,5 +1,5 @@
 """`python -m galileo_jax.studio`: the same as `galileo studio`."""
 
-from galileo_jax.__main__ import run_verb
+from galileo_jax.__main__ import cli
 
-run_verb(__name__, "studio")
+cli("studio")

@@ -14,20 +14,11 @@ Name = Annotated[str, Field(strict=True)]
 NoiseModel = Literal["camera", "bodies", "tracker"]
 
 
-def _entry_of(package: str) -> AfterValidator:
-    """Refuses what is no entry of a package's registry."""
-    known = entry_names(package)
-
-    def check(value: str) -> str:
-        if value not in known:
-            raise wrong(f"unknown value; known: {', '.join(known)}")
-        return value
-
-    return AfterValidator(check)
-
-
-Sampler = Annotated[Name, _entry_of("galileo_jax.inference.samplers.library")]
-Similarity = Annotated[Name, _entry_of("galileo_jax.thesis.similarities")]
+def _known_sampler(name: str) -> str:
+    known = entry_names("galileo_jax.inference.samplers.library")
+    if name not in known:
+        raise wrong(f"unknown value; known: {', '.join(known)}")
+    return name
 
 
 class _Settings(BaseModel):
@@ -53,7 +44,7 @@ class Mh(_Settings):
     method: Literal["mh"]
     effects: tuple[Name, ...] = ()
     noise: NoiseModel | None = None
-    sampler: Sampler = "mixture"
+    sampler: Annotated[Name, AfterValidator(_known_sampler)] = "mixture"
     chains: Annotated[int, Field(strict=True, ge=2)] = 8
     max_steps: Annotated[int, Field(strict=True, ge=25, multiple_of=25)] = 4000
 
@@ -68,7 +59,7 @@ class Thesis(_Settings):
     """The thesis's sampler on our rollouts; chains of 75 steps."""
 
     method: Literal["thesis"]
-    similarity: Similarity = "thesis_gaussian"
+    similarity: Literal["earth_mover", "root_mean", "thesis_gaussian"] = "thesis_gaussian"
     acceptance: Literal["coin", "metropolis"] = "coin"
     selection: Literal["best", "least_variance"] = "best"
     chains: Count = 16

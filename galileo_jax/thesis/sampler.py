@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import StrEnum
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -22,7 +21,7 @@ from galileo_jax.inference.samplers.sampler import (
     turn_of_one,
 )
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.thesis.similarity import similarity_class
+from galileo_jax.thesis.similarity import similarity as similarity_of
 
 SEARCHED = ("m1", "k1", "m2", "k2")
 NUM_CHAINS = 16
@@ -30,28 +29,12 @@ NUM_STEPS = 75
 NARROW = 0.05
 WIDE = 0.5
 WIDE_EVERY = 20
-
-
-class Acceptance(StrEnum):
-    """Which proposals are taken.
-
-    COIN: better ones always, others by a fair coin (the thesis).
-    METROPOLIS: with min(1, p(y) q(x | y) / (p(x) q(y | x))), which samples p.
-    """
-
-    COIN = "coin"
-    METROPOLIS = "metropolis"
-
-
-class Selection(StrEnum):
-    """What the answer is.
-
-    BEST: the sample of highest similarity in all chains (the thesis).
-    LEAST_VARIANCE: the mean of the chain whose variances over the parameters sum to least.
-    """
-
-    BEST = "best"
-    LEAST_VARIANCE = "least_variance"
+Acceptance = Literal["coin", "metropolis"]
+"""Of proposals: better ones always, others by a fair coin (the thesis); or with
+min(1, p(y) q(x | y) / (p(x) q(y | x))), which samples p."""
+Selection = Literal["best", "least_variance"]
+"""Of the answer: the sample of highest similarity in all chains (the thesis), or the mean of the
+chain whose variances over the parameters sum to least."""
 
 
 class ThesisState(NamedTuple):
@@ -70,11 +53,11 @@ class Thesis(AbstractSampler):
 
     The thesis redraws a parameter until it falls into (0, 1); the distribution is the same.
     With the coin the chain samples nothing in particular: it is a search, and its draws
-    are no posterior. Near 0 and 1 the proposals are not symmetric; METROPOLIS corrects it.
+    are no posterior. Near 0 and 1 the proposals are not symmetric; "metropolis" corrects it.
     """
 
     name: ClassVar[str] = "thesis"
-    acceptance: Acceptance = eqx.field(static=True, default=Acceptance.COIN)
+    acceptance: Acceptance = eqx.field(static=True, default="coin")
 
     def init(self, position: jax.Array, log_density: LogDensity) -> ThesisState:
         """The state at `position`, which must lie in (0, 1)."""
@@ -100,7 +83,7 @@ class Thesis(AbstractSampler):
             is_possible = (low <= y) & (y <= high)
             return jnp.sum(jnp.where(is_possible, -jnp.log(high - low), -jnp.inf))
 
-        if self.acceptance is Acceptance.METROPOLIS:
+        if self.acceptance == "metropolis":
             current = State(state.position, state.log_density)
             moved, info = metropolis_hastings(
                 key, current, log_density, propose, proposal_log_density
@@ -128,7 +111,7 @@ class ThesisResult(NamedTuple):
 
     Attributes:
       estimate: `[dim]`, in (0, 1); a point, without an interval.
-      posterior: all states of all chains; with `Acceptance.COIN` no posterior at all.
+      posterior: all states of all chains; with acceptance "coin" no posterior at all.
     """
 
     estimate: np.ndarray
@@ -140,8 +123,8 @@ def infer(
     log_similarity: LogDensity,
     names: Sequence[str] = SEARCHED,
     *,
-    acceptance: Acceptance = Acceptance.COIN,
-    selection: Selection = Selection.BEST,
+    acceptance: Acceptance = "coin",
+    selection: Selection = "best",
     num_chains: int = NUM_CHAINS,
 ) -> ThesisResult:
     """Runs 16 chains of 75 steps from uniform starts and selects an answer.
@@ -166,7 +149,7 @@ def select(posterior: Posterior, selection: Selection) -> np.ndarray:
 
     A better proposal is always kept, so the best state is also the best proposal.
     """
-    if selection is Selection.BEST:
+    if selection == "best":
         return posterior.flat()[np.argmax(posterior.log_density)]
     spread = posterior.draws.var(axis=1).sum(axis=-1)
     return posterior.draws[np.argmin(spread)].mean(axis=0)
@@ -180,8 +163,8 @@ def thesis_posterior(
     trials: JointProblem,
     seed: int,
     similarity: str,
-    acceptance: str,
-    selection: str,
+    acceptance: Acceptance,
+    selection: Selection,
     num_chains: int = NUM_CHAINS,
 ) -> tuple[Posterior, dict[str, float]]:
     """Runs the thesis's 16 x 75 steps, or 75 of another number of chains.
@@ -197,7 +180,6 @@ def thesis_posterior(
     (problem,) = trials.problems
     if not set(SEARCHED) <= set(trials.names):
         raise InputError("--preset thesis: two objects expected; this clip has one")
-    measure = similarity_class(similarity)()
     observation = problem.observation
     both = observation.mask[:, 1:] & observation.mask[:, :-1]
     dt = jnp.asarray(np.diff(observation.times_s))
@@ -209,14 +191,14 @@ def thesis_posterior(
     def log_similarity(theta: jax.Array) -> jax.Array:
         predicted = problem.predict(rest.at[where].set(theta))
         velocity = jnp.diff(predicted, axis=-1) / dt
-        return measure(velocity, observed, jnp.asarray(both))
+        return similarity_of(similarity, velocity, observed, jnp.asarray(both))
 
     answer = infer(
         jax.random.key(seed),
         log_similarity,
         SEARCHED,
-        acceptance=Acceptance(acceptance),
-        selection=Selection(selection),
+        acceptance=acceptance,
+        selection=selection,
         num_chains=num_chains,
     )
     draws = answer.posterior.draws

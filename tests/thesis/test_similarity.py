@@ -1,13 +1,15 @@
 """The thesis's similarities against plain NumPy, and the mask."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from galileo_jax.thesis.similarities.earth_mover import least_work
-from galileo_jax.thesis.similarity import similarity_class, similarity_names
+from galileo_jax.api.options import FitOptions, check_choices
+from galileo_jax.thesis.similarity import least_work, similarity
 
 FLOAT32_RTOL = 2e-5  # sums of a few dozen numbers
 
@@ -32,20 +34,16 @@ def plain_least_work(x, y):
     return table[-1, -1]
 
 
-def test_names():
-    assert similarity_names() == ("earth_mover", "root_mean", "thesis_gaussian")
-
-
 def test_unknown_name_lists_the_known():
     with pytest.raises(ValueError, match=r"unknown similarity 'drga'; known: earth_mover, "):
-        similarity_class("drga")
+        check_choices(FitOptions(similarity="drga"))  # pyright: ignore[reportArgumentType]
 
 
 def test_gaussian_is_the_log_density_of_independent_normals(profiles):
     predicted, observed, mask = profiles
     both = np.broadcast_to(mask[:, None], predicted.shape)
     expected = norm.logpdf(observed[both], predicted[both], np.sqrt(0.05)).sum()
-    value = similarity_class("thesis_gaussian")()(predicted, observed, mask)
+    value = similarity("thesis_gaussian", predicted, observed, mask)
     np.testing.assert_allclose(value, expected, rtol=FLOAT32_RTOL)
 
 
@@ -54,7 +52,7 @@ def test_root_mean_by_hand():
     observed = jnp.array([[[1.0, 3.0, 0.0, 1.0], [2.0, 1.0, 1.0, 1.0]]])
     mask = jnp.array([[True, True, True, False]])
     expected = np.sqrt((1 + 0.5**2 + 1 + 1 + 0 + 0) / 6)
-    value = similarity_class("root_mean")()(predicted, observed, mask)
+    value = similarity("root_mean", predicted, observed, mask)
     np.testing.assert_allclose(value, expected, rtol=FLOAT32_RTOL)
 
 
@@ -74,25 +72,27 @@ def test_earth_mover_forgives_a_delay_and_gaussian_does_not():
     pulse[..., 8:12] = 1.0
     late = np.roll(pulse, 3, axis=-1)
     mask = np.ones((1, 20), bool)
-    assert similarity_class("earth_mover")()(pulse, late, mask) == 0
-    gaussian = similarity_class("thesis_gaussian")()
+    assert similarity("earth_mover", pulse, late, mask) == 0
+    gaussian = partial(similarity, "thesis_gaussian")
     assert gaussian(pulse, late, mask) < gaussian(pulse, pulse, mask)
 
 
 @pytest.mark.parametrize("name", ["thesis_gaussian", "earth_mover", "root_mean"])
 def test_identical_profiles_are_the_best(name, profiles):
     predicted, observed, mask = profiles
-    similarity = similarity_class(name)()
-    assert similarity(observed, observed, mask) > similarity(predicted, observed, mask)
+    best = similarity(name, observed, observed, mask)
+    assert best > similarity(name, predicted, observed, mask)
 
 
 @pytest.mark.parametrize("name", ["thesis_gaussian", "earth_mover", "root_mean"])
 def test_masked_frames_count_for_nothing_in_the_gradient_too(name, profiles):
     predicted, observed, mask = profiles
     both = np.broadcast_to(mask[:, None], predicted.shape)
-    similarity = jax.jit(jax.value_and_grad(similarity_class(name)()))
-    plain = similarity(predicted, observed, mask)
-    hidden = similarity(np.where(both, predicted, np.inf), np.where(both, observed, np.nan), mask)
+    value_and_grad = jax.jit(jax.value_and_grad(partial(similarity, name)))
+    plain = value_and_grad(predicted, observed, mask)
+    hidden = value_and_grad(
+        np.where(both, predicted, np.inf), np.where(both, observed, np.nan), mask
+    )
     assert plain[0] == hidden[0]
     np.testing.assert_array_equal(plain[1], hidden[1])
     assert np.all(np.isfinite(plain[1]))
@@ -103,8 +103,8 @@ def test_masked_frames_count_for_nothing_in_the_gradient_too(name, profiles):
 @pytest.mark.parametrize("name", ["thesis_gaussian", "earth_mover", "root_mean"])
 def test_nothing_measured_is_finite(name, profiles):
     predicted, observed, mask = profiles
-    similarity = jax.value_and_grad(similarity_class(name)())
-    value, gradient = similarity(predicted, observed, np.zeros_like(mask))
+    value_and_grad = jax.value_and_grad(partial(similarity, name))
+    value, gradient = value_and_grad(predicted, observed, np.zeros_like(mask))
     assert np.isfinite(value)
     assert np.all(np.asarray(gradient) == 0)
 

@@ -26,6 +26,6 @@ def make_free_quantities(names: Sequence[str]) -> tuple[Effect, ...]:
         if names.count(name) > 1:
             raise InputError(f"free: {name!r} is named twice")
     try:
-        return tuple(_registry.get(name)() for name in sorted(names))
+        return tuple(_registry[name]() for name in sorted(names))
     except InputError as error:
         raise InputError(f"free: {error}") from error

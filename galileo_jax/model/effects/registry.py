@@ -73,7 +73,7 @@ def make_effects(names: Sequence[str]) -> tuple[Effect, ...]:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"effects: {name!r} is named twice")
-    return tuple(effect_registry.get(name)() for name in sorted(names))
+    return tuple(effect_registry[name]() for name in sorted(names))
 
 
 @functools.cache

@@ -1,1 +1,0 @@
-"""The scores of `--preset thesis`: one file each, named as the similarity."""
