@@ -23,8 +23,7 @@ from galileo_jax.rollout.motion import dynamics, state_at
 from galileo_jax.similarity.gaussian_likelihood import white_patterns
 from galileo_jax.statespace.kinematics import Kinematics
 from galileo_jax.statespace.path_deviation import PLACE, SPEED, deviations
-from galileo_jax.statespace.term import TERMS
-from galileo_jax.statespace.terms.friction_roughness import LENGTH_M, NAME
+from galileo_jax.statespace.terms import ROUGH_LENGTH_M, ROUGHNESS, TERMS
 
 SHOWN = 4  # steps of a stretch that tell an acceleration, as in `statespace.kinematics`
 STEP = 1e-4  # of z, for slopes
@@ -62,8 +61,8 @@ def friction_along_way(
     assert motion is not None and sizes is not None
     count, frames = motion.speed_m_s.shape
     body, first, last = _stretches(motion)
-    size = problem.size(TERMS[NAME], sizes.by_name[NAME])
-    both = deviations(motion, LENGTH_M, size, shown=(PLACE, SPEED))
+    size = problem.size(TERMS[ROUGHNESS], sizes.by_name[ROUGHNESS])
+    both = deviations(motion, ROUGH_LENGTH_M, size, shown=(PLACE, SPEED))
     both = np.moveaxis(both.reshape(frames, 2, count, frames, 2, count), (1, 4), (0, 1))
     (places, _), (speeds_places, speeds) = both.reshape(2, 2, frames * count, -1)
     coefficient, slopes = _coefficients(trials, fit, clip)
@@ -72,7 +71,7 @@ def friction_along_way(
     slopes = means @ slopes
     together = takes @ speeds_places @ shown - slopes @ linear.slopes.T
     scale = np.log(trials.noise_scale(trials.theta(fit.z, fit.free), clip)) / NOISE_SD
-    others = [term for term in trials.terms if term.name != NAME]
+    others = [term for term in trials.terms if term.name != ROUGHNESS]
     x = np.array([sizes.by_name[term.name] for term in others])
     cover = linear.covariance(others, x, scale) + linear.slopes @ linear.slopes.T
     gain = np.linalg.solve(cover + shown.T @ places @ shown, together.T).T

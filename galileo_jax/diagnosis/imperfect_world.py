@@ -24,7 +24,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.imperfect import with_imperfections
-from galileo_jax.statespace.terms.friction_roughness import NAME
+from galileo_jax.statespace.terms import ROUGHNESS
 
 # Beside none: so many of the most probable of each kind in the exact world.
 NUM_SINGLE, NUM_FORMS, NUM_PAIRS, NUM_LAWS = 6, 2, 2, 2
@@ -110,7 +110,7 @@ def imperfect_world(judge: Judge, base: Hypothesis) -> ImperfectWorld | None:
         return None
     sized = Hypothesis(base.effects, world.fit, world.trials)
     friction: tuple[tuple[Stretch, ...], ...] = ()
-    if NAME in world.fit.sizes.unusual:
+    if ROUGHNESS in world.fit.sizes.unusual:
         every = range(len(trials.problems))
         friction = tuple(friction_along_way(world.trials, world.fit, clip) for clip in every)
     comparison = compare(world.trials, world.fit, judge.seed)

@@ -30,7 +30,8 @@ from galileo_jax.similarity.gaussian_likelihood import (
     whitening_of,
 )
 from galileo_jax.statespace.kinematics import kinematics
-from galileo_jax.statespace.term import TERMS, Seen, Term
+from galileo_jax.statespace.term import Seen, Term
+from galileo_jax.statespace.terms import TERMS
 
 
 @dataclass(frozen=True)

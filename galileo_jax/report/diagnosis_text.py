@@ -16,10 +16,9 @@ from galileo_jax.report.phrases import listed
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.shown import value_text
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.statespace.term import TERMS
+from galileo_jax.statespace.terms import ROUGHNESS, TERMS
 
 NO_EFFECTS = "no effects"
-ROUGHNESS = "friction_roughness"
 MOST_APART = 2  # that are said one by one
 NEARLY_ALL = 0.9  # of the squared error beyond noise: what does so is worth a sentence
 PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that explains the data

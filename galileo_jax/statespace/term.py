@@ -9,7 +9,6 @@ from jaxtyping import Float
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.numerics.random_patterns import random_patterns
 from galileo_jax.observation.observation import Observation
-from galileo_jax.runtime.registry import Registry
 from galileo_jax.statespace.kinematics import Kinematics
 
 SMALLEST = 1e-7  # of the largest pattern's variance; what is smaller is left out
@@ -27,6 +26,9 @@ class Seen:
     motion: Kinematics | None  # along the path; None where no surface leads the bodies
 
 
+FromSeen = Callable[[Seen], Patterns | None]
+
+
 @dataclass(frozen=True)
 class Term:
     """A random function of unknown size."""
@@ -37,35 +39,13 @@ class Term:
     # Of the size's log-normal prior; `median` maps what was seen to it
     median: Callable[[Seen], float]
     factor: float
-    # `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit size; none
-    # where the term has no place
-    patterns: Callable[[Seen], Patterns]
+    made: FromSeen  # `patterns`; None where the term has no place
     is_of_marks: bool = False  # whether it is where bodies are seen, and not where they are
 
-
-TERMS: Registry[Term] = Registry("imperfection", "imperfections", "galileo_jax.statespace.terms")
-FromSeen = Callable[[Seen], Patterns | None]
-
-
-def term(
-    name: str,
-    meaning: str,
-    unit: str,
-    median: Callable[[Seen], float],
-    factor: float,
-    is_of_marks: bool = False,
-) -> Callable[[FromSeen], FromSeen]:
-    """Decorates a function that makes a term's patterns; it returns None where it has no place."""
-
-    def registered(made: FromSeen) -> FromSeen:
-        def patterns(seen: Seen) -> Patterns:
-            found = made(seen)
-            return np.zeros((0, *seen.observation.position_m.shape)) if found is None else found
-
-        TERMS.register(Term(name, meaning, unit, median, factor, patterns, is_of_marks))
-        return made
-
-    return registered
+    def patterns(self, seen: Seen) -> Patterns:
+        """Whose squares sum to the covariance at unit size, m; none where it has no place."""
+        found = self.made(seen)
+        return np.zeros((0, *seen.observation.position_m.shape)) if found is None else found
 
 
 def along_path(

@@ -10,7 +10,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import fit_worlds
-from galileo_jax.statespace.term import TERMS
+from galileo_jax.statespace.terms import TERMS
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT

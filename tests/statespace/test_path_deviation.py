@@ -7,7 +7,8 @@ import pytest
 
 from galileo_jax.statespace.kinematics import kinematics
 from galileo_jax.statespace.path_deviation import deviations
-from galileo_jax.statespace.term import TERMS, Seen
+from galileo_jax.statespace.term import Seen
+from galileo_jax.statespace.terms import TERMS
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve

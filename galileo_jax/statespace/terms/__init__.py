@@ -1,1 +1,0 @@
-"""Terms: one file each."""
