@@ -10,7 +10,6 @@ from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime.registry import entry_names
 
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
-FREE = ", ".join(entry_names("galileo_jax.model.effects.free"))
 
 
 def main(argv: Sequence[str]) -> None:
@@ -50,7 +49,7 @@ def _parser() -> VerbParser:
     parser.add("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     parser.add("method")
     parser.add("effects", metavar="A,B", help="effects in the model (default: none)")
-    free = f"declared quantities to infer: {FREE} (default: none)"
+    free = "declared quantities to infer: gravity (default: none)"
     parser.add("free", metavar="A,B", help=free)
     clip_options.add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     parser.add("discrepancy", "motion", "noise")

@@ -18,7 +18,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects import make_effects
-from galileo_jax.model.effects.free.gravity import PRIOR_SD
+from galileo_jax.model.effects.free_quantities import GRAVITY_SD
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run, save_run
@@ -130,7 +130,7 @@ def test_a_slope_tells_gravity_and_friction_together_only(tmp_path):
 def test_where_nothing_moves_the_prior_is_left(tmp_path):
     result, posterior = result_of(trials_of(still(tmp_path)))
     assert not result["parameters"]["gravity"]["identified"]
-    assert np.log(posterior["gravity"]).std() > 0.9 * PRIOR_SD
+    assert np.log(posterior["gravity"]).std() > 0.9 * GRAVITY_SD
 
 
 @pytest.mark.parametrize("effect", ["scale_error", "frame_rate"])
@@ -202,7 +202,7 @@ def test_engines_agree_on_another_gravity(engine, tmp_path):
 
 def test_what_is_refused(tmp_path):
     path = ramp(tmp_path)
-    with pytest.raises(InputError, match="free: unknown quantity 'gravitas'; known: gravity"):
+    with pytest.raises(InputError, match="free: unknown quantity 'gravitas'; did you mean gravity"):
         trials_of(path, free=("gravitas",))
     with pytest.raises(InputError, match="free: 'gravity' is named twice"):
         trials_of(path, free=("gravity", "gravity"))
