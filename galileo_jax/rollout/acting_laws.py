@@ -12,7 +12,6 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
@@ -22,7 +21,7 @@ LAW_HOOKS, OVAL_HOOKS = ("force", "push", "friction"), ("oval",)
 PACKAGE = f"{__name__.split('.')[0]}."
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Law:
     """An effect with a force or a friction law of its own, or rims that are not round."""
 
@@ -65,11 +64,7 @@ class ActingLaws:
     def __init__(self, model: Model):
         self._model = model
         self._share = functools.cache(self._share_of)
-        self._laws = tuple(
-            Law(effect, kind, self._columns(effect), self._absent(effect))
-            for effect in model.effects
-            if (kind := _kind(effect)) and self._columns(effect).size
-        )
+        self._laws = tuple(law for e in model.effects if (law := _law(e, model)) is not None)
         self._is_ours = all(type(e).__module__.startswith(PACKAGE) for e in model.effects)
 
     def shares(self, theta: np.ndarray) -> list[tuple[Share, np.ndarray]]:
@@ -78,47 +73,37 @@ class ActingLaws:
         Returns:
           parts, and the rows of each: those with the same laws side by side.
         """
-        acts = np.array([law.acts(theta) for law in self._laws], bool)
-        acts = acts.reshape(len(self._laws), len(theta))
-        kinds = self._kinds(acts)
+        acts = np.zeros((len(self._laws), len(theta)), bool)
+        kinds = np.full(len(theta), STEADY if self._is_ours else WITH_LAWS | WITH_OVALS)
+        for i, law in enumerate(self._laws):
+            acts[i] = law.acts(theta)
+            kinds |= np.where(acts[i], law.kind, STEADY)
         order = np.lexsort((*acts, kinds))
         return [(self._share(int(k)), order[kinds[order] == k]) for k in np.unique(kinds)]
 
-    def _kinds(self, acts: Bool[np.ndarray, "law batch"]) -> np.ndarray:
-        """Which program each rollout has, `[batch]`."""
-        if not self._is_ours:
-            return np.full(acts.shape[1], WITH_LAWS | WITH_OVALS)
-        kinds = np.zeros(acts.shape[1], int)
-        for law, is_there in zip(self._laws, acts, strict=True):
-            kinds |= np.where(is_there, law.kind, 0)
-        return kinds
-
     def _share_of(self, kind: int) -> Share:
-        laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
-        return self._without([law.effect for law in self._laws if law not in laws], laws)
-
-    def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
         model = self._model
-        gone = {int(i) for effect in left_out for i in self._columns(effect)}
+        laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
+        left_out = [law for law in self._laws if law not in laws]
+        gone = {int(i) for law in left_out for i in law.columns}
         columns = tuple(i for i in range(len(model.names)) if i not in gone)
-        effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
+        without = [law.effect for law in left_out]
+        effects = tuple(e for e in model.effects if e not in without) + model.nuisances
         places = tuple(effects.index(law.effect) for law in laws)
         return Share(effects, tuple(model.names[i] for i in columns), columns, laws, places)
 
-    def _columns(self, effect: Effect) -> np.ndarray:
-        parameters = effect.parameters(self._model.scene.surroundings)
-        return np.array([self._model.index(p.name) for p in parameters], int)
 
-    def _absent(self, effect: Effect) -> np.ndarray:
-        return np.array([self._model.parameters[i].absent for i in self._columns(effect)])
-
-
-def _kind(effect: Effect) -> int:
-    """What rollouts in which it acts have; 0: what all have."""
+def _law(effect: Effect, model: Model) -> Law | None:
+    """None of an effect without a place, or without anything that all rollouts do not have."""
     own = type(effect)
     bits = ((WITH_LAWS, LAW_HOOKS), (WITH_OVALS, OVAL_HOOKS))
-    return sum(
+    kind = sum(
         bit
         for bit, hooks in bits
         if any(getattr(own, hook) is not getattr(Effect, hook) for hook in hooks)
     )
+    columns = [model.index(p.name) for p in effect.parameters(model.scene.surroundings)]
+    if not kind or not columns:
+        return None
+    absent = np.array([model.parameters[i].absent for i in columns])
+    return Law(effect, kind, np.array(columns), absent)
