@@ -12,6 +12,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
@@ -74,21 +75,28 @@ class ActingLaws:
           parts, and the rows of each: those with the same laws side by side.
         """
         acts = np.zeros((len(self._laws), len(theta)), bool)
-        kinds = np.full(len(theta), STEADY if self._is_ours else WITH_LAWS | WITH_OVALS)
         for i, law in enumerate(self._laws):
             acts[i] = law.acts(theta)
-            kinds |= np.where(acts[i], law.kind, STEADY)
+        kinds = self._kinds(acts)
         order = np.lexsort((*acts, kinds))
         return [(self._share(int(k)), order[kinds[order] == k]) for k in np.unique(kinds)]
 
+    def _kinds(self, acts: Bool[np.ndarray, "law batch"]) -> np.ndarray:
+        """Which program each rollout has, `[batch]`."""
+        kinds = np.full(acts.shape[1], STEADY if self._is_ours else WITH_LAWS | WITH_OVALS)
+        for law, is_there in zip(self._laws, acts, strict=True):
+            kinds |= np.where(is_there, law.kind, STEADY)
+        return kinds
+
     def _share_of(self, kind: int) -> Share:
-        model = self._model
         laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
-        left_out = [law for law in self._laws if law not in laws]
-        gone = {int(i) for law in left_out for i in law.columns}
-        columns = tuple(i for i in range(len(model.names)) if i not in gone)
-        without = [law.effect for law in left_out]
-        effects = tuple(e for e in model.effects if e not in without) + model.nuisances
+        return self._without([law.effect for law in self._laws if law not in laws], laws)
+
+    def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
+        model, scene = self._model, self._model.scene.surroundings
+        gone = {parameter.name for effect in left_out for parameter in effect.parameters(scene)}
+        columns = tuple(i for i, name in enumerate(model.names) if name not in gone)
+        effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
         places = tuple(effects.index(law.effect) for law in laws)
         return Share(effects, tuple(model.names[i] for i in columns), columns, laws, places)
 
