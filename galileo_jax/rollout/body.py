@@ -194,12 +194,8 @@ def stepped(
 ) -> tuple[Pose, Impulses]:
     """The poses `[body]` after a time, and what the contacts did in it.
 
-    Args:
-      pose: at the beginning.
-      masses: of the bodies.
-      spent_s: the time.
-      at_middle: poses half of the way, with the speeds of the beginning, to accelerations without
-        contacts `[body, 3]` and the contacts that last.
+    `at_middle`: poses half of the way, with the speeds of the beginning, to accelerations without
+    contacts `[body, 3]` and the contacts that last.
     """
     half_s = 0.5 * spent_s
     middle = _drifted(pose, masses, half_s)

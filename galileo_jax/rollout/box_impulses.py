@@ -68,15 +68,9 @@ def after_impulses(
     mobility: Float[jax.Array, "box 3 3"],
     inverse_kg: Float[jax.Array, " box"],
 ) -> tuple[Speeds, jax.Array, tuple[jax.Array, ...]]:
-    """Speeds after the impulses at all corners and points, and these impulses.
+    """Speeds after the impulses at all corners and at the points of pairs, and these impulses.
 
-    Args:
-      speeds: before them.
-      corners: on the table.
-      points: of each pair in `boxes`.
-      boxes: which these are, `(one, other)`.
-      mobility: from angular momentum over the mass to spin.
-      inverse_kg: one over the masses.
+    `mobility`: from angular momentum over the mass to spin. `inverse_kg`: one over the masses.
     """
     of_corner = jax.vmap(_Corner.of, (Corners._make((0, 0, 0, None, 0)), None))
     stands = jax.vmap(of_corner)(corners, mobility)

@@ -72,10 +72,7 @@ class Rim(NamedTuple):
 def facing(apart_m: Float[jax.Array, " 2"], one: Rim, other: Rim) -> tuple[jax.Array, jax.Array]:
     """The direction in which two rims face each other, rad, and their gap, m.
 
-    Args:
-      apart_m: from the middle of one to that of the other.
-      one: the rim of the first.
-      other: that of the second.
+    `apart_m`: from the middle of one to that of the other.
     """
     distance = jnp.sqrt(jnp.sum(apart_m**2))
     straight = jnp.arctan2(apart_m[1], apart_m[0])
@@ -146,11 +143,9 @@ def hit_times_s(
 def _meeting_s(
     gap: Callable[[jax.Array], tuple[jax.Array, jax.Array]], left_s: jax.Array
 ) -> jax.Array:
-    """When gaps close, s `[...]`; inf where they do not within `left_s`.
+    """When gaps close, s `[...]`; inf where not in what is left of a step.
 
-    Args:
-      gap: a time to gaps, m, and how fast they grow.
-      left_s: what is left of the step.
+    `gap`: a time to gaps, m, and how fast they grow.
     """
     (now, rate), (_, bends) = jax.jvp(gap, (jnp.zeros(()),), (jnp.ones(()),))
     # What presses without a speed closes within the step all the same.

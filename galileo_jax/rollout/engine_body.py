@@ -34,17 +34,7 @@ IMPACT_PARTS = 8  # of an impact: friction acts against the slip of its own part
 def roll_out(
     solid: Solid, start: Pose, steps_s: Float[jax.Array, " frame"], substeps: int = 4
 ) -> Pose:
-    """One toss.
-
-    Args:
-      solid: the body and the plane.
-      start: at the first frame.
-      steps_s: from each frame to the next.
-      substeps: so many steps from frame to frame.
-
-    Returns:
-      the poses at all frames, `[frame + 1, ...]`.
-    """
+    """The poses of one toss at all frames, `[frame + 1, ...]`, in substeps from each to the next."""
 
     def advance(pose: Pose, _: jax.Array, left_s: jax.Array, is_last: jax.Array):
         return _to_impact(pose, left_s, is_last, solid)
@@ -119,10 +109,9 @@ def _masses(solid: Solid) -> Masses:
 
 
 def _alone(pose: Pose) -> Pose:
-    """One of one body."""
+    """One of one body; `_only` is the way back."""
     return jax.tree.map(lambda values: values[None], pose)
 
 
 def _only(pose: Pose) -> Pose:
-    """The first of all bodies."""
     return jax.tree.map(lambda values: values[0], pose)

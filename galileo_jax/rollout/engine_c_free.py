@@ -63,10 +63,7 @@ class EngineCFree:
         self.substeps = max(1, round(model.record_dt_s / STEP_S))
         self.compiled = free_model(model.scene, model.record_dt_s / self.substeps)
         self._sunk_m = _sunk_m(self.compiled)
-        self._batch = lru_cache(maxsize=4)(self._new_batch)
-
-    def _new_batch(self, size: int) -> Batch:
-        return Batch(self.compiled, nsim=size)
+        self._batch = lru_cache(maxsize=4)(lambda size: Batch(self.compiled, nsim=size))
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""

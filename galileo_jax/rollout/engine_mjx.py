@@ -42,15 +42,7 @@ class EngineMJX:
         self.batch = BATCH_CPU if self.is_on_cpu else BATCH_GPU
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rolls the scene out for each parameter vector; as `EngineC.simulate`.
-
-        Args:
-          theta: `[batch, parameter]`, in the model's units.
-
-        Returns:
-          Centres (m) and velocities (m/s), each `[batch, object, 2, record + 1]`; NaN where
-          the parameters are not finite.
-        """
+        """As `EngineC.simulate`; NaN where the parameters are not finite."""
         usable, is_good = finite(theta)
         missing = -len(usable) % self.batch
         padded = np.concatenate([usable, np.repeat(usable[:1], missing, axis=0)])

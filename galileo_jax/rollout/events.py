@@ -112,14 +112,7 @@ def of_task(follows: Callable[[Task], Any]) -> Callable[..., Any]:
 
 
 def recorded(system: System, num_records: int, dt_s: float, count: jax.Array | None = None) -> Any:
-    """The states at every record: leaves `[record, ...]`.
-
-    Args:
-      system: what moves.
-      num_records: which is compiled for.
-      dt_s: from one to the next.
-      count: of records that are wanted; beyond, bodies stay where they are then. None: all.
-    """
+    """The states at every record: leaves `[record, ...]`; beyond `count` bodies stay."""
 
     def step(state: Any, index: jax.Array) -> tuple[Any, Any]:
         after = step_by_events(system.advance, state, index * dt_s, dt_s, system.most_events)

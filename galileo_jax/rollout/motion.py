@@ -76,15 +76,10 @@ def dynamics(
     xp: Any,
     acts: Bool[Any, " effect"] | None = None,
 ) -> Dynamics:
-    """Puts parameters (each `[...]`) and effects together.
+    """Puts parameters (each `[...]`) and the effects that may act together.
 
-    Args:
-      effects: all that may act.
-      scene: as declared.
-      theta: parameters by name.
-      xp: NumPy or JAX.
-      acts: `[effect]`, in JAX: forces and friction laws of others are not computed at all, where
-        the same holds for all of a batch. None: all act.
+    `acts`, in JAX: forces and friction laws of others are not computed at all, where the same
+    holds for all of a batch. None: all act.
     """
     scene = true_surroundings(effects, theta, scene)
     mass = xp.stack(scene.mass(theta), axis=-1)
@@ -205,17 +200,9 @@ def state_at(path_m: PerObject, speed_m_s: PerObject, time_s: Array, scene: Surr
 def to_plane(
     path_m: PerObject, speed_m_s: PerObject, ramp_rad: Array, table_rad: Array, scene: Surroundings
 ) -> tuple[OfCentres, OfCentres]:
-    """From the path to x and y.
+    """Positions (m) and velocities (m/s), from the path to x and y.
 
-    Args:
-      path_m: `[..., object]`, m.
-      speed_m_s: `[..., object]`, m/s.
-      ramp_rad: the ramp's slope; broadcasts with `[...]`.
-      table_rad: the table's.
-      scene: its paths run parallel to ramp and table at the objects' half heights.
-
-    Returns:
-      positions (m) and velocities (m/s), each `[..., object, 2]`.
+    Paths run parallel to ramp and table, of these slopes `[...]`, at the objects' half heights.
     """
     xp = path_m.__array_namespace__()
 

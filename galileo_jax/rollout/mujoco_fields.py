@@ -178,13 +178,9 @@ def write_contacts(
     friction: Float[np.ndarray, "batch object"],
     faces: Float[np.ndarray, "batch 2"] | None,
 ) -> None:
-    """Writes friction coefficients, and what objects' faces are like, into a batch's contacts.
+    """Writes friction with what carries each object, and how faces are, into a batch's contacts.
 
-    Args:
-      batch: of the compiled model.
-      compiled: the model.
-      friction: of each object with what carries it.
-      faces: MuJoCo's direct solref between objects; None leaves them as they are.
+    `faces`: MuJoCo's direct solref between objects; None leaves them as they are.
     """
     written = batch.expand("pair_friction")
     for i in range(compiled.npair):
@@ -205,15 +201,9 @@ def read_state(
 def to_path(
     position: OfCentres, velocity: OfCentres, scene: Surroundings
 ) -> tuple[PerObject, PerObject]:
-    """Projects centres onto the paths parallel to ramp and table.
+    """Centres, and how fast they go, along the paths parallel to the declared ramp and table.
 
-    Args:
-      position: `[..., object, 2]`, m, a little off the path where contacts give way.
-      velocity: the same, m/s.
-      scene: its slope is the declared one, MuJoCo's.
-
-    Returns:
-      path (m) and speed along it (m/s), each `[..., object]`.
+    They are a little off these where contacts give way.
     """
     xp = position.__array_namespace__()
     cos, sin = math.cos(scene.angle_rad), math.sin(scene.angle_rad)
@@ -234,14 +224,7 @@ def rigid_motion(
 ) -> tuple[OfCentres, OfCentres]:
     """Takes the contacts' penetration out of simulated centres, and tilts them truly.
 
-    Args:
-      position: `[record, ..., object, 2]`, m.
-      velocity: `[record, ..., object, 2]`, m/s.
-      law: the rollouts' inertias and true slopes.
-      scene: the geometry.
-
-    Returns:
-      positions and velocities of the same shapes, on the path.
+    `position` and `velocity` have a leading axis of records.
     """
     path, speed = to_path(position, velocity, scene)
     if len(scene.names) > 1:

@@ -24,13 +24,9 @@ def conditional_log_density(
     noise_scale: Float[np.ndarray, " draw"],
     data: Whitening,
 ) -> Float[np.ndarray, "draw object axis frame"]:
-    """Log p(y_i | y_-i) of every coordinate.
+    """Log p(y_i | y_-i) of every coordinate, in 1/m; -inf where masked.
 
-    `difference_m`: `[draw, object, 2, frame]`, observed minus predicted. `noise_scale`: `[draw]`,
-    on the tracker's errors.
-
-    Returns:
-      `[draw, object, 2, frame]`, in 1/m; -inf where masked.
+    `difference_m`: observed minus predicted. `noise_scale`: on the tracker's errors.
     """
     root, basis = data.inverse_root, data.basis
     variance = np.asarray(noise_scale)[:, None] ** 2
@@ -51,11 +47,7 @@ def conditional_log_density(
 def noise_draws(
     rng: np.random.Generator, noise_scale: Float[np.ndarray, " draw"], data: Whitening
 ) -> Float[np.ndarray, "draw object axis frame"]:
-    """Draws of the likelihood's noise, one for each of `noise_scale` `[draw]`.
-
-    Returns:
-      `[draw, object, 2, frame]`, m; 0 where masked.
-    """
+    """Draws of the likelihood's noise, one for each of `noise_scale`, m; 0 where masked."""
     root = _root(data)
     count = len(noise_scale)
     white = rng.standard_normal((count, *data.observed_m.shape))

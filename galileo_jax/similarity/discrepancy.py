@@ -149,11 +149,8 @@ def _lens(aside: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
     """A lens that magnifies what is further out more (or less): r (1 + k r^2).
 
     About a centre c that is not the middle of the motion, to first order in c:
-    k (r^2 r - r^2 c - 2 (r.c) r); r is 1 at the furthest point seen.
-
-    Args:
-      aside: `[object, 2, frame]`, m, places about the middle of the motion.
-      seen: the same shape, where they were measured.
+    k (r^2 r - r^2 c - 2 (r.c) r); r is 1 at the furthest point seen. `aside`: places about the
+    middle of the motion.
     """
     edge_m = np.abs(np.where(seen, aside, 0.0)).max()
     if not edge_m:

@@ -26,14 +26,10 @@ def fitted_noise_scale(
     prior_sd: float,
     data: Whitening,
 ) -> Float[np.ndarray, " point"]:
-    """The most probable noise scales.
+    """The most probable noise scales, from residuals whitened at `noise_scale`.
 
-    Args:
-      white: residuals, whitened at `noise_scale`.
-      noise_scale: what they were whitened at.
-      used: how many numbers' worth of the data the parameters take up.
-      prior_sd: of the scale's logarithm, about 0.
-      data: the observation's covariance, decomposed.
+    `used`: how many numbers' worth of the data the parameters take up. `prior_sd`: of the scale's
+    logarithm, about 0.
     """
     variance, gain2 = noise_scale[:, None] ** 2, data.gain**2
     modes = (white @ data.rows.T) ** 2
@@ -59,8 +55,8 @@ def fitted_mode_size(
 ) -> float:
     """The most probable common size of the modes' amplitudes over their sd, from 0 to 1.
 
-    `white`: residuals, whitened at `noise_scale`. `noise_scale`: of the tracking errors. `errors`:
-    what of the modes' covariance is there in full, along them; None where nothing is.
+    `white`: residuals, whitened at `noise_scale`. `errors`: what of the modes' covariance is there
+    in full, along them; None where nothing is.
     """
     gain2 = data.gain**2
     errors = np.zeros((len(gain2), len(gain2))) if errors is None else errors
@@ -88,11 +84,7 @@ def errors_at(
     other_scale: Float[np.ndarray, " point"],
     data: Whitening,
 ) -> Float[np.ndarray, "point value"]:
-    """`Whitening.tracking_errors` at another noise scale, from whitened residuals.
-
-    `white`: residuals, whitened at `noise_scale`. `noise_scale`: what they were whitened at.
-    `other_scale`: at which the tracking errors are wanted.
-    """
+    """`Whitening.tracking_errors` at `other_scale`, from residuals whitened at `noise_scale`."""
     basis, gain2 = data.rows, data.gain**2
     before, after = noise_scale[:, None], other_scale[:, None]
     modes = white @ basis.T

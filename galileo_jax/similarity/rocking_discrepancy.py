@@ -27,8 +27,7 @@ def rocking(
 ) -> list[tuple[slice, float]]:
     """When object `i` rocks on the table: frames, from the first to the last, and its rise, m.
 
-    `position`: `[object, 2, frame]`, m, without NaN. `i`: which object. `past`: `[frame]`, where it
-    is wholly past the foot.
+    `position`: without NaN. `past`: `[frame]`, where it is wholly past the foot.
     """
     if not scene.has_table or (scene.rolls and scene.rolls[i]):
         return []

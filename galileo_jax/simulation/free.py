@@ -206,11 +206,8 @@ def by_events(
 ) -> Integrated:
     """The motion at some times, from event to event (Dormand and Prince, order 8).
 
-    Args:
-      stretch: of time, state, and whether an event is there, which it carries out.
-      state: at the first of the times.
-      times_s: `[time]`.
-      tolerances: relative, absolute.
+    `stretch`: of time, state, and whether an event is there, which it carries out. `state`: at the
+    first of the times. `tolerances`: relative, absolute.
     """
     states, changes, events = np.empty((len(times_s), len(state))), [], []
     begin, time = 0, float(times_s[0])

@@ -86,12 +86,9 @@ class Motion:
 def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S) -> Motion:
     """Simulates a truth for `seconds`.
 
-    Args:
-      truth: its `motion_effects` act.
-      solver: "rigid": the engine that also fits; "fine": small steps that share no event
-        logic with it (`solver.py`), for data that are to examine the fit; "free": from the first
-        hit on MuJoCo's bodies, which turn and tip.
-      seconds: s.
+    By the engine that also fits ("rigid"), by small steps that share no event logic with it, for
+    data that are to examine the fit ("fine", `solver.py`), or from the first hit on by MuJoCo's
+    bodies, which turn and tip ("free").
 
     Raises:
       InputError: the simulation failed at these values.

@@ -185,18 +185,9 @@ def draw_series(
     Where the given values allow it, object 1 hits object 2 in each and nothing leaves the
     table.
 
-    Args:
-      ramp_angle_deg: as declared.
-      given: masses and frictions (m1, k1, ...) that are not to be drawn; z2, see `draw_truth`.
-      hidden: what is hidden; of the parameters drawn, those of a trial differ between clips.
-      count: how many clips.
-      solver: see `roll_out`.
-      things: for the experiment.
-      secrets: for what is hidden.
-      frame_s: time between frames; given, clips have the small faults of real ones (release
-        between frames, a foot and an impact that are not ideal).
-      scenario: see `draw_truth`.
-      shapes: see `draw_truth`.
+    Of the hidden effects' parameters that are drawn, those of a trial differ between clips.
+    `things` draws the experiments, `secrets` what is hidden. See `draw_truth`, `with_faults` (which
+    has `frame_s`) and `roll_out` for the others.
     """
     first, motion = _try(
         lambda: _with_hidden(
@@ -242,12 +233,9 @@ def _with_hidden(
 
 
 def with_faults(truth: Truth, rng: np.random.Generator, frame_s: float | None) -> Truth:
-    """The truth with the small faults of real clips, drawn anew; without where `frame_s` is None.
+    """The truth with the small faults of real clips, drawn anew; as it is without a `frame_s`.
 
-    Args:
-      truth: what is hidden in it stays.
-      rng: of the faults.
-      frame_s: time between frames.
+    The release is between frames, `frame_s` apart; foot and impact are not ideal.
     """
     if frame_s is None:
         return truth

@@ -14,13 +14,9 @@ from galileo_jax.simulation.truth import Declared, Truth
 def truth_record(
     truth: Truth, declared: Declared, motion: Motion, frames: Motion
 ) -> dict[str, Any]:
-    """The experiment, what was hidden in it, and what became of it.
+    """The experiment, what was hidden in it, said of it, and what became of it.
 
-    Args:
-      truth: the experiment.
-      declared: what was said of it.
-      motion: from the release on.
-      frames: at the times of the clip's frames.
+    `motion`: from the release on. `frames`: at the times of the clip's frames.
     """
     parameters = {
         effect.name: [p for p in effect.parameters(truth.surroundings) if p.role == "effect"]

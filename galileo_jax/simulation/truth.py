@@ -187,12 +187,8 @@ def draw_truth(
 
     Where the given values allow it, object 1 hits object 2 at more than 0.5 m/s.
 
-    Args:
-      rng: of everything drawn.
-      ramp_angle_deg: of the ramp.
-      given: masses and frictions; places across the travel (z2), which are 0 otherwise.
-      scenario: ramp, multi or incline.
-      shapes: of the objects, in the order of the travel; what is round rolls.
+    Places across the travel (z2) are 0 where not given. `shapes`: of the objects, in the order of
+    the travel; what is round rolls.
     """
     truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
     for _ in range(NUM_TRIES):

@@ -130,12 +130,7 @@ def _lever_s(times_s: np.ndarray) -> float:
 def first_moved(
     place_m: Float[np.ndarray, " frame"], seen: Bool[np.ndarray, " frame"]
 ) -> int | None:
-    """The first frame in which a body that rested has left its place; None: it never does.
-
-    Args:
-      place_m: along the path.
-      seen: where it was measured.
-    """
+    """The first frame in which a body that rested has left its place; None: it never does."""
     known = np.flatnonzero(seen)
     if not known.size:
         return None

@@ -28,12 +28,9 @@ def transitions(
     diffusion: Float[np.ndarray, "step state state"],
     duration_s: Float[np.ndarray, " step"],
 ) -> Transitions:
-    """The transitions over steps in each of which A and L L^T are constant.
+    """The transitions over steps in each of which A and L L^T, of unit white noise, are constant.
 
-    Args:
-      drift: A, 1/s.
-      diffusion: L L^T, of unit white noise, 1/s.
-      duration_s: of each step.
+    `drift`: A, 1/s. `diffusion`: L L^T, 1/s.
     """
     size = drift.shape[-1]
     rate = np.abs(drift).sum(axis=-1).max(axis=-1, initial=0.0) * duration_s
@@ -57,13 +54,7 @@ def covariance(
     start: Float[np.ndarray, "state state"],
     seen: Float[np.ndarray, "frame seen state"],
 ) -> Float[np.ndarray, "frame seen frame seen"]:
-    """The covariance of `seen @ x` at all frames.
-
-    Args:
-      way: from each frame to the next.
-      start: the state's covariance at the first frame.
-      seen: what is seen of the state in each frame.
-    """
+    """The covariance of `seen @ x` at all frames, x of covariance `start` at the first."""
     frames, num_seen, _ = seen.shape
     found = np.zeros((frames, num_seen, frames, num_seen))
     now = start
