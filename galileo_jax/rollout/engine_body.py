@@ -34,7 +34,7 @@ IMPACT_PARTS = 8  # of an impact: friction acts against the slip of its own part
 def roll_out(
     solid: Solid, start: Pose, steps_s: Float[jax.Array, " frame"], substeps: int = 4
 ) -> Pose:
-    """The poses of one toss at all frames, `[frame + 1, ...]`, in substeps from each to the next."""
+    """The poses of one toss at all frames, `[frame + 1, ...]`; `substeps` from each to the next."""
 
     def advance(pose: Pose, _: jax.Array, left_s: jax.Array, is_last: jax.Array):
         return _to_impact(pose, left_s, is_last, solid)
