@@ -10,7 +10,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import Scene, start_paths
+from galileo_jax.model.scene.scene import Scene, laid_out, on_ramp
 from tests.reference_ramp import Experiment
 
 HIT = Experiment(
@@ -29,24 +29,15 @@ def make_surroundings(experiment: Experiment) -> Surroundings:
     """The experiment's geometry."""
     angle, up = experiment.angle_rad, experiment.release_m
     (length1, height1), (length2, height2) = experiment.size_m
-    cos, sin = math.cos(angle), math.sin(angle)
-    start = (-up * cos + height1 / 2 * sin, up * sin + height1 / 2 * cos)
-    starts, halves = [start], [(length1 / 2, height1 / 2)]
+    starts, halves = [on_ramp(-up, height1 / 2, angle)], [(length1 / 2, height1 / 2)]
     if experiment.object2_x_m is not None:
         starts.append((experiment.object2_x_m, height2 / 2))
         halves.append((length2 / 2, height2 / 2))
-    corner = tuple(height * math.tan(angle / 2) for _, height in halves)
     return Surroundings(
         names=("object1", "object2")[: len(starts)],
         angle_rad=angle,
         gravity=experiment.gravity,
-        half_length_m=tuple(length for length, _ in halves),
-        half_height_m=tuple(height for _, height in halves),
-        corner_m=corner,
-        start_m=tuple(starts),
-        start_path_m=start_paths(tuple(starts), corner, angle),
-        has_table=True,
-        comes_down=(True, False)[: len(starts)],
+        **laid_out(halves, tuple(starts), angle, has_table=True),
     )
 
 

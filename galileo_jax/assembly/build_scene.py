@@ -12,7 +12,7 @@ from galileo_jax.clip.sizes import extents, rolling
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 from galileo_jax.model.effects.laws.walls import StraightWalls
-from galileo_jax.model.scene.scene import Scene, start_paths
+from galileo_jax.model.scene.scene import Scene, laid_out, on_ramp
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -32,7 +32,6 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
       InputError: an object is never seen, or one stands before the one declared before it.
     """
     scenario = SCENARIOS[clip.scenario]
-    has_surface, has_table = scenario.has_surface, scenario.has_table
     if scenario.has_ramp:
         assert clip.ramp_angle_deg is not None  # the clip's own validation
         angle = math.radians(clip.ramp_angle_deg)
@@ -40,24 +39,15 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         angle = 0.0 if scenario.moves_in_plane else math.pi / 2
     half = [extents(declared) for declared in clip.objects]
     starts = _starts(clip, observation, [height for _, height in half], angle)
-    corner = tuple(h * math.tan(angle / 2) if has_table else math.inf for _, h in half)
     surroundings = Surroundings(
         names=observation.names,
         angle_rad=angle,
         gravity=clip.gravity,
-        half_length_m=tuple(length for length, _ in half),
-        half_height_m=tuple(height for _, height in half),
-        corner_m=corner,
-        start_m=starts,
-        start_path_m=start_paths(starts, corner, angle),
-        has_table=has_table,
-        comes_down=tuple(
-            has_table and bool(at[0] < c) for at, c in zip(starts, corner, strict=True)
-        ),
+        **laid_out(half, starts, angle, scenario.has_table),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
         is_scale_stated=clip.pixels_per_metre_sd is not None,
-        has_surface=has_surface,
+        has_surface=scenario.has_surface,
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if scenario.has_ramp else {}),
         is_box=tuple(declared.shape == "box" for declared in clip.objects),
@@ -84,7 +74,7 @@ def _starts(
             starts.append(tuple(map(float, observation.position_m[i, :, seen[0]])))
         elif i == 0:
             along = x * math.cos(angle) - y * math.sin(angle)
-            starts.append(_on_ramp(along, height, angle))
+            starts.append(on_ramp(along, height, angle))
         else:
             starts.append((float(x), height))
             if x < starts[i - 1][0]:
@@ -135,11 +125,3 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
         return float(times[0]), frame_s
     release = float(np.clip(-intercept / slope, times[0], times[-1]))
     return release, max(3 * frame_s, 0.05)
-
-
-def _on_ramp(along: float, height: float, angle: float) -> tuple[float, float]:
-    """The centre of an object that stands `along` metres past the foot, on the ramp."""
-    return (
-        along * math.cos(angle) + height * math.sin(angle),
-        -along * math.sin(angle) + height * math.cos(angle),
-    )

@@ -17,6 +17,7 @@ from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
+from galileo_jax.model.scene.scene import laid_out
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
@@ -75,9 +76,13 @@ class PlaneTruth:
     @property
     def surroundings(self) -> Surroundings:
         """The scene as the laws see it."""
-        scenario, count = SCENARIOS[self.scenario], len(self.things)
+        scenario = SCENARIOS[self.scenario]
         half = [extents(thing) for thing in self.things]
-        height = 0 if scenario.is_level else 1  # seen from above both are the radius
+        start = self.start_m
+        if scenario.is_level:  # seen from above both are the radius
+            half = [(radius, radius) for radius, _ in half]
+            start = tuple((*at, 0.0) for at in start)
+        angle = 0.0 if scenario.moves_in_plane else math.pi / 2
         declared = (("floor", "floor_restitution" in self.values), ("walls", bool(self.walls_m)))
         size_m, expected = self.things[0].size_m, ELSEWHERE
         air = {}
@@ -88,15 +93,9 @@ class PlaneTruth:
             air = expected_added_mass(size_m[0], self.values["m1"])
         return Surroundings(
             names=tuple(thing.name for thing in self.things),
-            angle_rad=0.0 if scenario.moves_in_plane else math.pi / 2,
+            angle_rad=angle,
             gravity=self.gravity,
-            half_length_m=tuple(each[0] for each in half),
-            half_height_m=tuple(each[height] for each in half),
-            corner_m=(math.inf,) * count,
-            start_m=tuple((*at, 0.0) if scenario.is_level else at for at in self.start_m),
-            start_path_m=(0.0,) * count,
-            has_table=False,
-            comes_down=(False,) * count,
+            **laid_out(half, start, angle, has_table=False),
             has_surface=scenario.is_level,
             moves_in_plane=scenario.moves_in_plane,
             laws=scenario.laws + tuple(name for name, is_there in declared if is_there),

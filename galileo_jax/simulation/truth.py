@@ -14,7 +14,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.clip.sizes import extents, rolling
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.model.scene.scene import start_paths
+from galileo_jax.model.scene.scene import laid_out, on_ramp
 from galileo_jax.runtime.errors import InputError
 
 NONE = "none"  # hidden
@@ -68,27 +68,17 @@ class Truth:
     def surroundings(self) -> Surroundings:
         """The geometry as the scene and the effects see it."""
         half = [extents(declared) for declared in self.objects]
-        up, height = self.release_m, half[0][1]
-        cos, sin = math.cos(self.angle_rad), math.sin(self.angle_rad)
-        has_table = SCENARIOS[self.scenario].has_table
-        bend = math.tan(self.angle_rad / 2) if has_table else math.inf
-        corner = tuple(height * bend for _, height in half)
         standing = (self.object2_x_m, *self.beyond_x_m)[: len(half) - 1]
         start = (
-            (-up * cos + height * sin, up * sin + height * cos),
+            on_ramp(-self.release_m, half[0][1], self.angle_rad),
             *((x, height) for x, (_, height) in zip(standing, half[1:], strict=True)),
         )
+        has_table = SCENARIOS[self.scenario].has_table
         return Surroundings(
             names=tuple(declared.name for declared in self.objects),
             angle_rad=self.angle_rad,
             gravity=self.gravity,
-            half_length_m=tuple(length for length, _ in half),
-            half_height_m=tuple(height for _, height in half),
-            corner_m=corner,
-            start_m=start,
-            start_path_m=start_paths(start, corner, self.angle_rad),
-            has_table=has_table,
-            comes_down=(has_table,) + (False,) * (len(half) - 1),
+            **laid_out(half, start, self.angle_rad, has_table),
             **rolling(self.objects),
         )
 

@@ -10,7 +10,7 @@ from galileo_jax.clip.sizes import extents, rolling
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import absent
-from galileo_jax.model.scene.scene import Scene, start_paths
+from galileo_jax.model.scene.scene import Scene, laid_out, on_ramp
 from galileo_jax.rollout.engine_path import EnginePath
 
 BOX = ClipObject(name="box", shape="box", size_m=(0.06, 0.06, 0.06))
@@ -30,21 +30,13 @@ def scene_of(
     """Object 1 on the ramp, the others `beyond_m` past its foot."""
     angle = math.radians(angle_deg)
     half = [extents(each) for each in objects]
-    sin, cos, height = math.sin(angle), math.cos(angle), half[0][1]
-    first = (-release_m * cos + height * sin, release_m * sin + height * cos)
+    first = on_ramp(-release_m, half[0][1], angle)
     starts = (first, *((x, h) for x, (_, h) in zip(beyond_m, half[1:], strict=True)))
-    corner = tuple(h * math.tan(angle / 2) if has_table else math.inf for _, h in half)
     return Surroundings(
         names=tuple(f"object{i + 1}" for i in range(len(objects))),
         angle_rad=angle,
         gravity=9.81,
-        half_length_m=tuple(length for length, _ in half),
-        half_height_m=tuple(h for _, h in half),
-        corner_m=corner,
-        start_m=starts,
-        start_path_m=start_paths(starts, corner, angle),
-        has_table=has_table,
-        comes_down=(has_table,) + (False,) * (len(objects) - 1),
+        **laid_out(half, starts, angle, has_table),
         **rolling(objects),
     )
 

@@ -7,9 +7,10 @@ The rigid engine needs no MuJoCo model: it is compiled, and MuJoCo imported, whe
 # pyright: reportAttributeAccessIssue=false
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.effects.effect import Surroundings
@@ -95,15 +96,33 @@ class Scene:
         return math.isfinite(self.surroundings.corner_m[0])
 
 
-def start_paths(
-    starts: tuple[tuple[float, ...], ...], corners: tuple[float, ...], angle: float
-) -> tuple[float, ...]:
-    """How far each start `(x, y)` is past the foot, along the path; 0 without a table."""
-    paths = []
-    for (x, *_), corner in zip(starts, corners, strict=True):
-        past = x - corner if math.isfinite(corner) else 0.0
-        paths.append(past / math.cos(angle) if past < 0 else past)
-    return tuple(paths)
+def laid_out(
+    half_m: Sequence[tuple[float, float]],
+    start_m: tuple[tuple[float, ...], ...],
+    angle_rad: float,
+    has_table: bool,
+) -> dict[str, Any]:
+    """Sizes and places as `Surroundings` takes them, of half lengths and heights, and starts."""
+    bend = math.tan(angle_rad / 2) if has_table else math.inf
+    corner_m = tuple(height * bend for _, height in half_m)
+    past_m = [
+        x - corner if has_table else 0.0 for (x, *_), corner in zip(start_m, corner_m, strict=True)
+    ]
+    return {
+        "half_length_m": tuple(length for length, _ in half_m),
+        "half_height_m": tuple(height for _, height in half_m),
+        "corner_m": corner_m,
+        "start_m": start_m,
+        "start_path_m": tuple(x / math.cos(angle_rad) if x < 0 else x for x in past_m),
+        "has_table": has_table,
+        "comes_down": tuple(bool(x < 0) for x in past_m),
+    }
+
+
+def on_ramp(along_m: float, height_m: float, angle_rad: float) -> tuple[float, float]:
+    """The centre of an object of half this height that stands `along_m` past the foot."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    return along_m * cos + height_m * sin, -along_m * sin + height_m * cos
 
 
 def _spec(surroundings: Surroundings, declared: tuple[Solid, ...]) -> "mujoco.MjSpec":
