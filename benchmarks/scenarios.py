@@ -57,8 +57,9 @@ class Free:
         """Draws and measures one clip."""
         things, looks = np.random.default_rng([seed, 7]).spawn(2)
         truth = draw_free(things, self.scenario, {}, self.has_floor)
-        frames = sampled_motion(truth, solve_free(truth)[0], FPS, truth.seconds)
-        seen = noisy_track(truth, frames, NOISE_M, looks)
+        declared = truth.declared(FPS)
+        frames = sampled_motion(declared, solve_free(truth)[0], truth.seconds)
+        seen = noisy_track(truth, declared, frames, NOISE_M, looks)
         true = {key: value for key, value in truth.values.items() if key != "m1"}
         if not self.is_scaled:
             scale = float(looks.uniform(*SCALES_PX_PER_M))

@@ -81,7 +81,7 @@ def declared_picture(camera: synthetic.Camera, magnified: float = 1.0) -> dict[s
     }
 
 
-def ramp_filming(
+def filming_of(
     settings: Settings, declared: Declared, num_frames: int, rng: np.random.Generator
 ) -> synthetic.Filming:
     """Frame rate, exposure and faults; the hand and the missed frames are drawn."""
@@ -102,17 +102,6 @@ def ramp_filming(
         defocus_px=settings.defocus,
         repeated_frames=tuple(sorted(map(int, missed))),
         hand=hand,
-    )
-
-
-def plane_filming(settings: Settings, clock: float) -> synthetic.Filming:
-    """Frame rate and exposure; `clock` is declared frame rate over true frame rate."""
-    return synthetic.Filming(
-        fps=settings.fps / clock,
-        written_fps=settings.fps,
-        exposure_s=min(settings.exposure, clock / settings.fps),
-        noise_grey_levels=settings.noise,
-        defocus_px=settings.defocus,
     )
 
 

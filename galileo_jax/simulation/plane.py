@@ -20,7 +20,7 @@ from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import laid_out
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
-from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
+from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2, Declared
 
 Point = tuple[float, float]
 # What a prior would be told of; any numbers do.
@@ -44,24 +44,9 @@ class PlaneTruth:
     walls_m: tuple[tuple[Point, Point], ...] = ()  # the ends of every wall
     gravity: float = GRAVITY_M_S2
 
-    def value(self, name: str) -> float:
-        """Of a parameter that may not be there; 0 then."""
-        return self.values.get(name, 0.0)
-
-    @property
-    def clock(self) -> float:
-        """Declared frame rate over true frame rate."""
-        return 1.0 + self.value("frame_rate")
-
-    @property
-    def magnified(self) -> float:
-        """How many times as large as they are lengths are said to be."""
-        return 1.0 + self.value("scale_error")
-
-    @property
-    def start_s(self) -> float:
-        """When the motion begins, on the true clock after the first frame."""
-        return self.release_s + self.value("release_delay")
+    def declared(self, fps: float) -> Declared:
+        """What is said of it, filmed at what is said to be `fps`."""
+        return Declared.of(self.values, fps, release_s=self.release_s)
 
     @property
     def theta(self) -> dict[str, Any]:

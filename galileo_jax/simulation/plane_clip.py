@@ -21,8 +21,8 @@ from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
 from galileo_jax.simulation.filming import (
     MARGIN_M,
     declared_picture,
+    filming_of,
     plane_camera,
-    plane_filming,
     reported,
 )
 from galileo_jax.simulation.free import WATER_KG_M3, draw_free, solve_free
@@ -32,6 +32,7 @@ from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.plane import PlaneTruth, hide_in_plane
 from galileo_jax.simulation.record import plane_record
 from galileo_jax.simulation.settings import Settings
+from galileo_jax.simulation.truth import Declared
 from galileo_jax.video import synthetic
 
 RUN_UP_S = 0.2  # no exposure is longer
@@ -62,18 +63,21 @@ def _write(settings: Settings, truth: PlaneTruth, looks: np.random.Generator, ou
     scene = truth.surroundings
     motion, events_s = (solve_level if scene.is_level else solve_free)(truth)
     seconds = settings.seconds or min(truth.seconds, float(motion.times_s[-1]))
-    frames = sampled_motion(truth, motion, settings.fps, seconds)
+    declared = truth.declared(settings.fps)
+    frames = sampled_motion(declared, motion, seconds)
     content = declared_content(truth, settings.fps)
     events = "hits" if scene.is_level else "bounces"
     record = plane_record(out.stem, settings, truth, frames) | {
-        "events_s": {events: [round(t + truth.start_s, 4) for t in events_s]}
+        "events_s": {events: [round(t + declared.release_s, 4) for t in events_s]}
     }
     if not scene.is_level:
         rows = (frames.times_s, *frames.position_m[0])
         rounded = [np.round(row, 6).tolist() for row in rows]
         record["trajectory"] = dict(zip("txy", rounded, strict=True))
     if settings.track_only:
-        write_observation_csv(out, noisy_track(truth, frames, settings.track_noise, looks))
+        write_observation_csv(
+            out, noisy_track(truth, declared, frames, settings.track_noise, looks)
+        )
         content = {"track": out.name, **content}
     else:
         margin = PUCKS_MARGIN_M if scene.is_level else MARGIN_M
@@ -81,7 +85,7 @@ def _write(settings: Settings, truth: PlaneTruth, looks: np.random.Generator, ou
         points = camera.project(frames.position_m[:, :, 0])
         for entry, point in zip(content["objects"], points, strict=True):
             entry["point_px"] = np.round(point, 1).tolist()
-        picture = declared_picture(camera, truth.magnified)
+        picture = declared_picture(camera, declared.scale)
         if not _has_origin(camera):
             del picture["origin_px"]
         content = {"video": out.name, **picture, **content}
@@ -91,8 +95,8 @@ def _write(settings: Settings, truth: PlaneTruth, looks: np.random.Generator, ou
             path = _with_run_up(motion)
         # From above a puck is a disc, and all else is a ball.
         bodies = tuple(synthetic.Body("sphere", (radius,)) for radius in scene.half_length_m)
-        filming = plane_filming(settings, truth.clock)
         count, seed = len(frames.times_s), settings.seed
+        filming = filming_of(settings, declared, count, looks)
         synthetic.render_clip(
             out, path, bodies, camera, None, filming, count, seed=seed, on_frame=reported(count)
         )
@@ -117,16 +121,20 @@ def _with_run_up(motion: Motion) -> synthetic.Motion:
     )
 
 
-def sampled_motion(truth: PlaneTruth, motion: Motion, fps: float, seconds: float) -> Motion:
+def sampled_motion(declared: Declared, motion: Motion, seconds: float) -> Motion:
     """The motion in the frames' true instants; at the start before it is let go."""
-    true_fps = fps / truth.clock
+    true_fps = declared.true_fps
     taken = np.arange(max(2, math.floor(seconds * true_fps) + 1)) / true_fps
-    frames = motion.at(taken - truth.start_s)
+    frames = motion.at(taken - declared.release_s)
     return Motion(taken, frames.position_m, frames.velocity_m_s, frames.pitch_rad)
 
 
 def noisy_track(
-    truth: PlaneTruth, frames: Motion, noise_m: float, rng: np.random.Generator
+    truth: PlaneTruth,
+    declared: Declared,
+    frames: Motion,
+    noise_m: float,
+    rng: np.random.Generator,
 ) -> Observation:
     """The track: of centres, and from above of turning, since rims are followed as well."""
     scene = truth.surroundings
@@ -135,9 +143,9 @@ def noisy_track(
         sd = noise_m / np.array([(1.0, 1.0, radius) for radius in scene.half_length_m])
     else:
         start = np.asarray(truth.start_m)[..., None]
-        shown = start + truth.magnified * (frames.position_m - start)
+        shown = start + declared.scale * (frames.position_m - start)
         sd = np.full(shown.shape[:2], noise_m)
-    times = frames.times_s / truth.clock
+    times = np.arange(len(frames.times_s)) / declared.fps
     return clip_files.noisy_track(scene.names, times, shown, sd, rng, is_turning=scene.is_level)
 
 

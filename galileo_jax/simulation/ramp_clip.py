@@ -15,7 +15,7 @@ from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitu
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.runtime import progress
 from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
-from galileo_jax.simulation.filming import declared_picture, film_ramp, ramp_camera, ramp_filming
+from galileo_jax.simulation.filming import declared_picture, film_ramp, filming_of, ramp_camera
 from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import LONGEST_S, Motion, Solver, roll_out
 from galileo_jax.simulation.record import truth_record
@@ -91,7 +91,7 @@ def _write(
     series: str | None,
 ) -> None:
     """Writes one clip, its yaml and its truth into the folder of `out`."""
-    declared = Declared.of(truth, settings.fps)
+    declared = Declared.of(truth.effect_values, settings.fps, truth.ramp_angle_deg)
     ends = motion.leaves_s(BEYOND_TABLE_M if truth.surroundings.has_table else 0.0)
     longest = min(LONGEST_S, ends + declared.release_s)
     at_rest = motion.rest_s + declared.release_s + AFTER_REST_S
@@ -117,7 +117,7 @@ def _write(
         names, sd = truth.surroundings.names, np.full(shown.shape[:2], settings.track_noise)
         write_observation_csv(out, noisy_track(names, times, shown, sd, looks))
     else:
-        filming = ramp_filming(settings, declared, num_frames, faults)
+        filming = filming_of(settings, declared, num_frames, faults)
         record |= film_ramp(out, truth, declared, motion, camera, filming, num_frames, seed)
     write_yaml_and_truth(out, content, record)
 

@@ -105,22 +105,30 @@ class Declared:
     """What a user says of a clip: wrong where an effect of the measurement is hidden."""
 
     fps: float  # frames per second
-    ramp_angle_deg: float  # of the ramp
     scale: float  # measured lengths are so many times the true ones
     true_fps: float  # at which the frames were taken
     release_s: float  # when object 1 is let go after the first frame, true seconds
+    ramp_angle_deg: float  # of the ramp, where there is one
 
     @classmethod
-    def of(cls, truth: Truth, fps: float) -> "Declared":
-        """What is declared about `truth`, filmed at what is said to be `fps`."""
-        value = truth.effect_values.get
-        steeper_deg = math.degrees(value("ramp_angle", 0.0))
+    def of(
+        cls,
+        values: Mapping[str, float],
+        fps: float,
+        ramp_angle_deg: float = 0.0,
+        release_s: float = 0.0,
+    ) -> "Declared":
+        """What is said where effects have these values by name; the angle and the release are true.
+
+        `fps`: what the frame rate is said to be.
+        """
+        value = values.get
         return cls(
             fps=fps,
-            ramp_angle_deg=round(truth.ramp_angle_deg - steeper_deg, 9),
             scale=1.0 + value("scale_error", 0.0),
             true_fps=fps / (1.0 + value("frame_rate", 0.0)),
-            release_s=value("release_delay", 0.0) + value("release_instant", 0.0),
+            release_s=release_s + value("release_delay", 0.0) + value("release_instant", 0.0),
+            ramp_angle_deg=round(ramp_angle_deg - math.degrees(value("ramp_angle", 0.0)), 9),
         )
 
     def taken_s(self, num_frames: int) -> np.ndarray:

@@ -111,7 +111,7 @@ def test_what_is_declared():
     wrong = {"frame_rate": 0.05, "scale_error": -0.04, "release_delay": 0.2, "ramp_angle": 0.02}
     for name, value in wrong.items():
         truth = hide(truth, hidden(name, **{name: value}), np.random.default_rng(0))
-    declared = Declared.of(truth, fps=30.0)
+    declared = Declared.of(truth.effect_values, 30.0, truth.ramp_angle_deg)
     assert (declared.fps, declared.ramp_angle_deg) == (30.0, 20.0)
     assert truth.ramp_angle_deg == pytest.approx(20 + math.degrees(0.02))
     assert declared.true_fps == pytest.approx(30 / 1.05)
