@@ -159,27 +159,19 @@ KINDS: tuple[type[Prior], ...] = (Normal, LogNormal, Uniform, HalfNormal, LongTa
 
 @dataclass(frozen=True)
 class Parameter:
-    """One unknown of the model.
+    """One unknown of the model."""
 
-    Attributes:
-      name: as it stands in result.json.
-      unit: SI; "1" for a pure number.
-      prior: what is known before the data.
-      absent: the value at which what the parameter stands for is not there.
-      role: "main" (what the user asks for), "nuisance" or "effect"; "latent": of a function that
-        is told as a whole; "given": a number that compiled code needs and nobody infers.
-      step: a coarse step in `z` for the first finite differences, before the scale of the
-        posterior is known; None: no rollout depends on it (clock, camera).
-      per_clip: whether each clip of a series has its own (nuisances always do).
-    """
-
-    name: str
-    unit: str
-    prior: Prior
-    absent: float
+    name: str  # as it stands in result.json
+    unit: str  # SI; "1" for a pure number
+    prior: Prior  # what is known before the data
+    absent: float  # the value at which what the parameter stands for is not there
+    # "main" (what the user asks for), "nuisance" or "effect"; "latent": of a function that is told
+    # as a whole; "given": a number that compiled code needs and nobody infers
     role: Role = "main"
+    # A coarse step in `z` for the first finite differences, before the scale of the posterior is
+    # known; None: no rollout depends on it (clock, camera)
     step: float | None = 0.02
-    per_clip: bool = False
+    per_clip: bool = False  # whether each clip of a series has its own (nuisances always do)
 
     @property
     def is_positive(self) -> bool:

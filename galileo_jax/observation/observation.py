@@ -17,19 +17,12 @@ Steps = Float[np.ndarray, " step"]
 
 @dataclass(frozen=True)
 class PointPath:
-    """Where one object was seen.
+    """Where one object was seen."""
 
-    Attributes:
-      frames: `[place]`, numbers of the frames in which it was.
-      times_s: `[place]`, s.
-      place_m: `[axis, place]`, m.
-      variance_m2: `[place]`, of a coordinate, m^2.
-    """
-
-    frames: Int[np.ndarray, " place"]
+    frames: Int[np.ndarray, " place"]  # their numbers
     times_s: Float[np.ndarray, " place"]
     place_m: Float[np.ndarray, "axis place"]
-    variance_m2: Float[np.ndarray, " place"]
+    variance_m2: Float[np.ndarray, " place"]  # of a coordinate
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -55,40 +48,30 @@ class Observation:
     Axes: x along the travel (positive in the direction of `Clip.direction`), y up;
     the origin is the foot of the ramp at table level. The point followed is the
     object's centre up to an unknown constant offset of a few millimetres.
-
-    Attributes:
-      names: the objects' names.
-      times_s: `[frame]`, s.
-      position_m: `[object, 2, frame]`, m; NaN where `mask` is False.
-      covariance_m2: `[object, 2, 2, frame]`, m^2, tracking error of each frame (independent
-        between frames).
-      mask: `[object, frame]`, True where the point was measured.
-      modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
-        deviation of it moves the track: a number declared about the camera (corners, lens), what
-        a coder repeats of an error; None where there are none.
-      num_errors: how many of `modes_m`, the last, are errors that follow each other in time: unlike
-        imperfections, which a good clip need not have, these are there.
-      is_turning: the third axis is how far each object has turned, rad, not a place.
-      turned_rad: `[object, frame]`, how far each puck has turned by its picture, counter-clockwise:
-        to know how it starts, not to be fitted; NaN where nothing shows it, None where nobody
-        looked.
-      wander_m: how far camera and tracker wander in this clip, m; None where nobody looked.
-      noise_known_to: how well the size of the tracking errors is known in one stretch of a motion:
-        sd of the logarithm of their variance over what is stated; 0: exactly.
-      is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # the objects'
     times_s: Float[np.ndarray, " frame"]
-    position_m: Float[np.ndarray, "object axis frame"]
+    position_m: Float[np.ndarray, "object axis frame"]  # NaN where `mask` is False
+    # Tracking error of each frame, independent between frames
     covariance_m2: Float[np.ndarray, "object 2 2 frame"]
-    mask: Bool[np.ndarray, "object frame"]
+    mask: Bool[np.ndarray, "object frame"]  # True where the point was measured
+    # m: errors that many frames share, each as one standard deviation of it moves the track: a
+    # number declared about the camera (corners, lens), what a coder repeats of an error
     modes_m: Float[np.ndarray, "mode object axis frame"] | None = None
+    # The modes tell how square the camera stands; else it is as good as usual
     is_squared: bool = False
+    # How many of `modes_m`, the last, are errors that follow each other in time: unlike
+    # imperfections, which a good clip need not have, these are there
     num_errors: int = 0
-    is_turning: bool = False
+    is_turning: bool = False  # the third axis is how far each object has turned, rad, not a place
+    # How far each puck has turned by its picture, counter-clockwise: to know how it starts, not to
+    # be fitted; NaN where nothing shows it, None where nobody looked
     turned_rad: Float[np.ndarray, "object frame"] | None = None
+    # How far camera and tracker wander in this clip, m; None where nobody looked
     wander_m: float | None = None
+    # How well the size of the tracking errors is known in one stretch of a motion: sd of the
+    # logarithm of their variance over what is stated; 0: exactly
     noise_known_to: float = 0.0
 
     @property

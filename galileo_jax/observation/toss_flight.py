@@ -18,22 +18,14 @@ FLAT = np.cos(np.radians(2.0))  # one of its axes is upright to within two degre
 
 @dataclass(frozen=True)
 class Flight:
-    """The flight of one toss.
+    """The flight of one toss; vectors are `[3]`, at the first frame."""
 
-    Attributes:
-      last: index of the last frame that is surely free.
-      position_m, velocity_m_s: `[3]`, at the first frame.
-      quaternion: `[4]`, at the first frame.
-      spin_rad_s: `[3]`, along the world's axes.
-      acceleration_m_s2: `[3]`, constant, of a parabola through the flight.
-    """
-
-    last: int
+    last: int  # index of the last frame that is surely free
     position_m: np.ndarray
     velocity_m_s: np.ndarray
-    quaternion: np.ndarray
-    spin_rad_s: np.ndarray
-    acceleration_m_s2: np.ndarray
+    quaternion: np.ndarray  # `[4]`
+    spin_rad_s: np.ndarray  # along the world's axes
+    acceleration_m_s2: np.ndarray  # constant, of a parabola through the flight
 
 
 def _turned(quaternion: np.ndarray) -> Any:

@@ -23,14 +23,10 @@ SPARE = 3  # records beyond the last time: between two of them a place is interp
 
 
 class EngineJax:
-    """Simulates batches of parameter vectors; compiled once for all clips of a kind.
-
-    Attributes:
-      roll_out: of one parameter vector.
-    """
+    """Simulates batches of parameter vectors; compiled once for all clips of a kind."""
 
     name = "rigid"
-    roll_out: ClassVar[RollOut]
+    roll_out: ClassVar[RollOut]  # of one parameter vector
 
     def __init__(
         self,

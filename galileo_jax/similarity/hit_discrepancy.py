@@ -50,22 +50,14 @@ def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.
 
 @dataclass(frozen=True)
 class _Hit:
-    """A hit of two bodies in a frame, and how each goes on from there.
-
-    Attributes:
-      frame: of the hit.
-      front: the object that is hit; the one before hits it.
-      both: `[k]`, frames after it in which both are seen and move.
-      loses, gains: of the rear's speed and of the front's, m/s; as the masses, the other way round.
-      pulled_apart: by friction, m/s^2; negative where it presses the bodies together.
-    """
+    """A hit of two bodies in a frame, and how each goes on from there."""
 
     frame: int
-    front: int
-    both: np.ndarray
-    loses: float
-    gains: float
-    pulled_apart: float
+    front: int  # the object that is hit; the one before hits it
+    both: np.ndarray  # `[k]`, frames after it in which both are seen and move
+    loses: float  # of the rear's speed, m/s; as the masses, the other way round
+    gains: float  # of the front's
+    pulled_apart: float  # by friction, m/s^2; negative where it presses the bodies together
 
 
 def _at_the_hit(

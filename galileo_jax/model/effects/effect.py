@@ -30,19 +30,13 @@ Theta = Mapping[str, Any]
 
 
 class State(NamedTuple):
-    """The objects at one instant; leading axes are the batch's.
+    """The objects at one instant; leading axes are the batch's."""
 
-    Attributes:
-      path_m: `[..., object]`, how far each centre is past the foot; negative on the ramp.
-        Without a table: how far it has gone; in the plane, along its curve.
-      speed_m_s: `[..., object]`; to a friction law, that at which the surfaces slip.
-      time_s: scalar, since the release.
-      is_on_ramp: `[..., object]`.
-    """
-
+    # How far each centre is past the foot; negative on the ramp. Without a table: how far it has
+    # gone; in the plane, along its curve
     path_m: PerObject
-    speed_m_s: PerObject
-    time_s: Float[AnyArray, ""]
+    speed_m_s: PerObject  # to a friction law, that at which the surfaces slip
+    time_s: Float[AnyArray, ""]  # since the release
     is_on_ramp: PerObject
 
 
@@ -92,63 +86,46 @@ class Surroundings:
 
     A PyTree, so that one compiled program serves every clip: inside it the numbers are
     traced. What decides which parameters there are is static.
-
-    Attributes:
-      names: of the objects.
-      angle_rad: the ramp's; of a path straight down pi / 2, in the plane 0.
-      gravity: m/s^2, as declared; to the hooks of the motion `[...]` where it is inferred.
-      half_length_m, half_height_m: `[object]`, along the travel and across it.
-      corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
-        without a table.
-      start_m: `[object, axis]`, the centres at the release; of a flight in space with z.
-      start_path_m: `[object]`, the same along the path, see `State`.
-      has_table: whether the ramp ends on a table.
-      comes_down: `[object]`, whether the object starts on the ramp.
-      release_s: when the release was, after the first frame: expected, and its standard
-        deviation.
-      is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
-      is_scale_stated: whether the clip says how well its scale is known.
-      has_surface: whether objects slide on something; not in a fall, in the air, in a liquid.
-      mass_kg: `[object]`, as weighed, None where not; empty: none is.
-      rolls: `[object]`, whether it is round and may turn; empty: none does.
-      roll_inertia: `[object]`, beta = J / (m r^2) of what rolls; empty: none does.
-      is_box: `[object]`, whether it is declared to be one; empty: none is.
-      moves_in_plane: whether the path is not given, but bends with the motion.
-      laws: names of the laws that are always there (`effects/laws/`).
-      expected: by name the two numbers of a prior: of the laws' parameters what a look at the
-        clip suggests, wide against what the fit will tell; of the angle, scale and origin how
-        well they are declared, where not taken at their word.
-      walls_m: `[wall, end, 2]`, on a table that is seen from above: the declared walls' ends.
-      half_depth_m, beside_m: `[object]`, of boxes that move freely: half the extent across the
-        travel, and how far the centre is from the plane, towards the camera; empty: of others.
-      way_m: how far object 1 is seen to go; 0: nothing was seen yet.
     """
 
-    names: tuple[str, ...]
-    angle_rad: float
-    gravity: Any  # a number; within compiled code, or of a batch, an array
+    names: tuple[str, ...]  # of the objects
+    angle_rad: float  # the ramp's; of a path straight down pi / 2, in the plane 0
+    # m/s^2, as declared; to the hooks of the motion, within compiled code, `[...]`
+    gravity: Any
+    # `[object]`, along the travel and across it
     half_length_m: tuple[float, ...]
     half_height_m: tuple[float, ...]
+    # `[object]`, x at which each centre's path bends from ramp to table; inf without a table
     corner_m: tuple[float, ...]
+    # `[object, axis]`, the centres at the release; of a flight in space with z
     start_m: tuple[tuple[float, ...], ...]
-    start_path_m: tuple[float, ...]
-    has_table: bool
-    comes_down: tuple[bool, ...]
+    start_path_m: tuple[float, ...]  # `[object]`, the same along the path, see `State`
+    has_table: bool  # whether the ramp ends on a table
+    comes_down: tuple[bool, ...]  # `[object]`, whether the object starts on the ramp
+    # When the release was, after the first frame: expected, and its standard deviation
     release_s: tuple[float, float] = (0.0, 0.01)
-    is_scale_known: bool = True
-    is_scale_stated: bool = False
+    is_scale_known: bool = True  # whether the observation's metres are metres
+    is_scale_stated: bool = False  # whether the clip says how well its scale is known
+    # Whether objects slide on something; not in a fall, in the air, in a liquid
     has_surface: bool = True
-    mass_kg: tuple[float | None, ...] = ()
+    mass_kg: tuple[float | None, ...] = ()  # `[object]`, as weighed, None where not; empty: none is
+    # `[object]`, whether it is round and may turn, and beta = J / (m r^2) then; empty: none does
     rolls: tuple[bool, ...] = ()
     roll_inertia: tuple[float, ...] = ()
-    is_box: tuple[bool, ...] = ()
-    moves_in_plane: bool = False
-    laws: tuple[str, ...] = ()
+    is_box: tuple[bool, ...] = ()  # `[object]`, whether it is declared to be one; empty: none is
+    moves_in_plane: bool = False  # whether the path is not given, but bends with the motion
+    laws: tuple[str, ...] = ()  # names of those that are always there (`effects/laws/`)
+    # By name the two numbers of a prior: of the laws' parameters what a look at the clip suggests,
+    # wide against what the fit will tell; of the angle, scale and origin how well they are
+    # declared, where not taken at their word
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    # `[wall, end, 2]`, on a table that is seen from above: the declared walls' ends
     walls_m: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
+    # `[object]`, of boxes that move freely: half the extent across the travel, and how far the
+    # centre is from the plane, towards the camera; empty: of others
     half_depth_m: tuple[float, ...] = ()
     beside_m: tuple[float, ...] = ()
-    way_m: float = 0.0
+    way_m: float = 0.0  # how far object 1 is seen to go; 0: nothing was seen yet
 
     @property
     def is_level(self) -> bool:
