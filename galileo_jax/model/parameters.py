@@ -261,13 +261,8 @@ def absent(parameters: Sequence[Parameter]) -> np.ndarray:
 def prior_deviations(parameters: Sequence[Parameter], z: np.ndarray) -> np.ndarray:
     """How many prior standard deviations nuisances are from what is expected of them.
 
-    Args:
-      parameters: in the order of `z`.
-      z: `[parameter]`.
-
-    Returns:
-      `[parameter]`; 0 of all that are no nuisances, and of one that is most likely 0 and smaller
-      than its prior's median.
+    0 of all that are no nuisances, and of one that is most likely 0 and smaller than its prior's
+    median.
     """
     is_nuisance = np.array([p.role == "nuisance" for p in parameters])
     is_one_sided = np.array([isinstance(p.prior, HalfNormal) for p in parameters])

@@ -6,14 +6,14 @@ import numpy as np
 from mujoco.batch import Batch
 
 from galileo_jax.model.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.motion import dynamics, state_at
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
     finite,
     make_fields,
     make_loads,
-    read_state,
     rigid_motion,
+    to_path,
     write_contacts,
 )
 
@@ -40,15 +40,10 @@ class EngineC:
         return Batch(self.model.scene.model, nsim=size)
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rolls the scene out for each parameter vector.
+        """Centres (m) and velocities (m/s), each `[batch, object, 2, record + 1]`.
 
-        Args:
-          theta: `[batch, parameter]`, in the model's units.
-
-        Returns:
-          Centres (m) and their velocities (m/s), each `[batch, object, 2, record + 1]`,
-          every `record_dt_s` from the release on. Entries of a rollout with non-finite
-          parameters or one that MuJoCo gave up are NaN.
+        Every `record_dt_s` from the release on, of `theta` `[batch, parameter]`. Entries of a
+        rollout with non-finite parameters or one that MuJoCo gave up are NaN.
         """
         usable, is_good = finite(theta)
         model, scene = self.model, self.model.scene.surroundings
@@ -75,7 +70,8 @@ class EngineC:
             if record == len(positions) - 1:
                 break
             time_s = record * SUBSTEPS * dt
-            state = read_state(positions[record], velocities[record], np.asarray(time_s), scene)
+            path, speed = to_path(positions[record], velocities[record], scene)
+            state = state_at(path, speed, np.asarray(time_s), scene)
             if loads.force is not None:
                 applied[:] = loads.force(state)
             if loads.friction is not None:

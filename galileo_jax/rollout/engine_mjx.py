@@ -11,15 +11,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.motion import dynamics, state_at
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
     finite,
     make_fields,
     make_loads,
-    read_state,
     rigid_motion,
     sliding_object,
+    to_path,
 )
 
 # Without the two lines that it prints where NVIDIA Warp is not installed.
@@ -87,7 +87,8 @@ class EngineMJX:
 
         def record(data, index):
             position, velocity = look(data)
-            state = read_state(position, velocity, index * SUBSTEPS * dt, scene)
+            path, speed = to_path(position, velocity, scene)
+            state = state_at(path, speed, index * SUBSTEPS * dt, scene)
             rubbed = model
             if loads.force is not None:
                 data = data.replace(qfrc_applied=loads.force(state))

@@ -55,18 +55,12 @@ class Task(NamedTuple):
 
 
 class System:
-    """What an engine moves, and how; from the task alone.
+    """What an engine moves, and how; from the task alone."""
 
-    Attributes:
-      law, scene: of the task.
-      start: the state at the release.
-      most_events: so many advances make up a step at most; 1: there are no events.
-      part: where motion between events is known in closed form, a state and the index of its
-        record to the state `PART` records later, and those at the records, `[record, ...]`.
-    """
-
-    start: Any
-    most_events = 16
+    start: Any  # the state at the release
+    most_events = 16  # so many advances make up a step at most; 1: there are no events
+    # Where motion between events is known in closed form, a state and the index of its record to
+    # the state `PART` records later, and those at the records, `[record, ...]`
     part: Part | None = None
 
     def __init__(self, task: Task):
@@ -211,13 +205,10 @@ def newton(
 ) -> tuple[jax.Array, jax.Array]:
     """Where a level falls through zero, and what is left of it one step before; not below 0.
 
-    Safeguarded by bisection. Beyond `most` where it does so there only.
+    Safeguarded by bisection, from a first guess on. Beyond `most`, the last time at which the level
+    may be asked for, where it does so there only.
 
-    Args:
-      level: a time to levels `[...]`, above zero before, and how fast they rise.
-      at: a first guess, `[...]`.
-      most: the last time at which the level may be asked for.
-      steps: of the search.
+    `level`: a time to levels `[...]`, above zero before, and how fast they rise.
     """
 
     def nearer(at: jax.Array, low: jax.Array, high: jax.Array) -> tuple[jax.Array, ...]:
@@ -259,7 +250,7 @@ def to_crossing(
         how fast it rises.
       jump: the state behind the events, from that before them and which they are, `[...]`.
       left_s: what is left of the step.
-      may: `[...]`, which events there can be.
+      may: which events there can be, `[...]`.
     """
     whole = after(left_s)
     over = jnp.where(left_s > 0, left_s, 1.0)

@@ -22,7 +22,6 @@ from galileo_jax.rollout.motion import (
     Dynamics,
     OfCentres,
     PerObject,
-    state_at,
     to_plane,
 )
 
@@ -189,13 +188,6 @@ def write_contacts(
             written[:, i, :2] = friction[:, which, None]
         elif faces is not None:
             batch.expand("pair_solref")[:, i] = faces
-
-
-def read_state(
-    position: OfCentres, velocity: OfCentres, time_s: Array, scene: Surroundings
-) -> State:
-    """The state at MuJoCo's centres and velocities, each `[..., object, 2]`."""
-    return state_at(*to_path(position, velocity, scene), time_s, scene)
 
 
 def to_path(

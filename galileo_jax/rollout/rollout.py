@@ -73,15 +73,9 @@ def in_jax(engine: Engine) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]
 
 
 def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Centres and velocities at any times, by cubic Hermite interpolation between events.
+    """Centres and velocities `[object, 2, frame]`, by Hermite's cubics between events.
 
-    Args:
-      trajectory: of one rollout.
-      times_s: `[frame]`, s since the release; before it the objects stand at their start,
-        after the end they keep their last place.
-
-    Returns:
-      positions (m) and velocities (m/s), each `[object, 2, frame]`.
+    Before the release the objects stand at their start, after the end they keep their last place.
     """
     dt = trajectory.times_s[1]
     last = trajectory.times_s.shape[0] - 2

@@ -77,13 +77,16 @@ def plane_record(
 
 
 def _trajectory(frames: Motion, index: int) -> Mapping[str, list[Any]]:
-    return {
-        "y": _rounded(frames.position_m[index, 0]),
-        "z": _rounded(frames.position_m[index, 1]),
-        "pitch": _rounded(frames.pitch_rad[index]),
-        "vy": _rounded(frames.velocity_m_s[index, 0]),
-        "vz": _rounded(frames.velocity_m_s[index, 1]),
-    } | _turned(frames, index)
+    found = {
+        "y": frames.position_m[index, 0],
+        "z": frames.position_m[index, 1],
+        "pitch": frames.pitch_rad[index],
+        "vy": frames.velocity_m_s[index, 0],
+        "vz": frames.velocity_m_s[index, 1],
+    }
+    if frames.z_m is not None and frames.quaternion is not None:
+        found |= {"across": frames.z_m[index], "quaternion": frames.quaternion[index].T}
+    return {name: _rounded(values) for name, values in found.items()}
 
 
 def _off_the_plane(truth: Truth, motion: Motion) -> Mapping[str, Any]:
@@ -91,15 +94,6 @@ def _off_the_plane(truth: Truth, motion: Motion) -> Mapping[str, Any]:
     if motion.z_m is None:
         return {}
     return {"motion": "free", "z_m": {each.name: each.z_m for each in truth.objects}}
-
-
-def _turned(frames: Motion, index: int) -> dict[str, list[Any]]:
-    if frames.z_m is None or frames.quaternion is None:
-        return {}
-    return {
-        "across": _rounded(frames.z_m[index]),
-        "quaternion": _rounded(frames.quaternion[index].T),
-    }
 
 
 def _rounded(values: np.ndarray) -> list[Any]:

@@ -35,16 +35,9 @@ def mixing(num_knots: int) -> np.ndarray:
 
 
 def splines(time_s: Array, begin_s: Array, end_s: Array, num_knots: int) -> Array:
-    """The B-splines at a time, kept from beyond `[begin_s, end_s]`.
+    """The B-splines at times `[...]`, kept from beyond `[begin_s, end_s]`: `[..., knot]`.
 
-    Args:
-      time_s: `[...]`, s.
-      begin_s: `[...]`, s; where the first interval begins.
-      end_s: `[...]`, s; where the last one ends.
-      num_knots: how many splines.
-
-    Returns:
-      `[..., knot]`; they add up to 1.
+    They add up to 1.
     """
     share = (time_s - begin_s) / (end_s - begin_s)
     xp = share.__array_namespace__()
@@ -116,15 +109,9 @@ class FreeAcceleration(Effect):
         return SD_M_S2 * np.asarray(block_diag(*(mixing(count) for count in counts)))
 
     def knot_values(self, times_s: np.ndarray, wanted: np.ndarray, index: int) -> np.ndarray:
-        """The parameters' `z` with which an object's acceleration is closest to given curves.
+        """The parameters' `z` `[knot, curve]` with which an object comes closest to given curves.
 
-        Args:
-          times_s: `[time]`.
-          wanted: `[time, curve]`, m/s^2.
-          index: of the object.
-
-        Returns:
-          `[knot, curve]`.
+        `wanted`: accelerations, `[time, curve]`, m/s^2. `index`: of the object.
         """
         blocks = []
         spans = self.spans_s[index]
