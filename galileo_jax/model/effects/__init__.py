@@ -13,6 +13,7 @@ from galileo_jax.model.effects.effect import (
     Surroundings,
     Theta,
     Walls,
+    by_object,
     not_negative,
 )
 from galileo_jax.model.effects.registry import effect_names, load_file, make_effects, register

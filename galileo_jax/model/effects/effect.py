@@ -362,6 +362,14 @@ def _in_place(where: Place, own: Any, absent: Any) -> Any:
     return hook
 
 
+def by_object(theta: Theta, names: Sequence[Sequence[str]]) -> Float[AnyArray, "... object part"]:
+    """Parameters of each object by their names; 0 of those that there are not."""
+    zero = 0.0 * theta["m1"]
+    xp = zero.__array_namespace__()
+    rows = [xp.stack([theta.get(name, zero) for name in own], axis=-1) for own in names]
+    return xp.stack(rows, axis=-2)
+
+
 def not_negative(k: PerObject) -> PerObject:
     """Friction coefficients, or 0 in place of what is less."""
     return k.__array_namespace__().maximum(k, 0.0 * k)

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.effects.effect import Surroundings
@@ -24,6 +24,7 @@ SHAPE_RGBA = ([0.35, 0.60, 0.30, 1], [0.62, 0.45, 0.70, 1], [0.80, 0.36, 0.22, 1
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
+@runtime_checkable
 class Solid(Protocol):
     """What is drawn of an object, and touches where it moves freely."""
 

@@ -20,7 +20,7 @@ and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int
 Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase flow (impact).
 """
 
-from galileo_jax.model.effects import Effect, Normal, Parameter, Rims, Role, Uniform
+from galileo_jax.model.effects import Effect, Normal, Parameter, Rims, Role, Uniform, by_object
 
 OFFSET = (
     "hit_offset"  # in `Surroundings.expected`: how well places relative to each other are known
@@ -55,23 +55,13 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
         return tuple(found)
 
     def start_velocity(self, theta, scene):
-        zero = 0.0 * theta["m1"]
-        rows = [
-            [theta[name] if name in scene.expected else zero for name in _starts(i)]
-            for i in range(len(scene.names))
-        ]
-        xp = zero.__array_namespace__()
-        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+        return by_object(theta, [_starts(i) for i in range(len(scene.names))])
 
     def rims(self, theta, scene):
         zero = 0.0 * theta["m1"]
-        xp = zero.__array_namespace__()
-        places = [xp.stack([zero, zero], axis=-1)]
-        for i in range(1, len(scene.names)):
-            places.append(xp.stack([theta[f"{OFFSET}_{axis}{i + 1}"] for axis in "xy"], axis=-1))
-        if len(scene.names) == 1:
-            return Rims(zero, zero, xp.stack(places, axis=-2))
-        return Rims(theta["restitution"], theta["grip"], xp.stack(places, axis=-2))
+        numbers = range(1, len(scene.names) + 1)
+        places = by_object(theta, [[f"{OFFSET}_{axis}{i}" for axis in "xy"] for i in numbers])
+        return Rims(theta.get("restitution", zero), theta.get("grip", zero), places)
 
     def derived(self, theta, scene):
         if scene.is_scale_known:

@@ -12,7 +12,7 @@ has that angle. Drag on the way from there is neglected.
 A throw, a swing that is under way, a body that was let go before the clip begins.
 """
 
-from galileo_jax.model.effects import Effect, Normal, Parameter
+from galileo_jax.model.effects import Effect, Normal, Parameter, by_object
 
 SPACE = ("start_velocity_x", "start_velocity_y", "start_velocity_z")
 PLANE = SPACE[:2]
@@ -36,8 +36,7 @@ class StartVelocity(Effect, where=lambda scene: "start_velocity" in scene.laws):
     def start_velocity(self, theta, scene):
         if not scene.is_thrown:
             return None
-        components = [theta[name] for name in SPACE[: scene.num_axes]]
-        return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
+        return by_object(theta, [SPACE[: scene.num_axes]])
 
     def start_speed(self, theta, scene):
         if scene.is_thrown:

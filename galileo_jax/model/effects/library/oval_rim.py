@@ -13,7 +13,7 @@ Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. 
 Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
 """
 
-from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, register
+from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, by_object, register
 
 PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
 
@@ -35,9 +35,7 @@ class OvalRim(Effect, where=_can_meet):
         )
 
     def oval(self, theta, scene):
-        rows = [[theta[name] for name in _names(i)] for i in range(len(scene.names))]
-        xp = rows[0][0].__array_namespace__()
-        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+        return by_object(theta, [_names(i) for i in range(len(scene.names))])
 
 
 def _names(i: int) -> tuple[str, ...]:

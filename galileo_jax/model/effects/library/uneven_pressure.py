@@ -16,7 +16,7 @@ Robotics Res. 15, 557 (a limit surface about the centre of pressure).
 Confused with: nothing where the turning is in the data; else hardly seen at all.
 """
 
-from galileo_jax.model.effects import Effect, Normal, Parameter, register
+from galileo_jax.model.effects import Effect, Normal, Parameter, by_object, register
 
 PRIOR = Normal(0.0, 0.15)  # of a radius: a felt or a burr on one side
 
@@ -33,9 +33,7 @@ class UnevenPressure(Effect, where=lambda scene: scene.is_level):
         )
 
     def pressure(self, theta, scene):
-        rows = [[theta[name] for name in self._names(i)] for i in range(len(scene.names))]
-        xp = rows[0][0].__array_namespace__()
-        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+        return by_object(theta, [self._names(i) for i in range(len(scene.names))])
 
     def _names(self, i: int) -> tuple[str, ...]:
         return tuple(f"{self.name}_{axis}{i + 1}" for axis in "xy")
