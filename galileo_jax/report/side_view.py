@@ -85,7 +85,7 @@ def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
     angle = surroundings.angle_rad
     if not surroundings.has_surface or surroundings.is_level:
         return [_rail(np.array(ends)) for ends in surroundings.walls_m]
-    if scene.has_table:
+    if surroundings.has_table:
         start_x = surroundings.start_m[0][0]
         length = min(
             -view.left_m / math.cos(angle),

@@ -1,6 +1,6 @@
 """How the objects of a truth move."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -51,14 +51,11 @@ class Motion:
             found = [np.interp(times_s, self.times_s, row) for row in rows]
             return np.reshape(found, (*values.shape[:-1], len(times_s)))
 
-        return Motion(
-            times_s,
-            between(self.position_m),
-            between(self.velocity_m_s),
-            between(self.pitch_rad),
-            None if self.z_m is None else between(self.z_m),
-            None if self.quaternion is None else _unit(between(self.quaternion)),
-        )
+        each = ((one.name, getattr(self, one.name)) for one in fields(self))
+        found = {name: between(values) for name, values in each if values is not None}
+        if self.quaternion is not None:
+            found["quaternion"] /= np.linalg.norm(found["quaternion"], axis=1, keepdims=True)
+        return Motion(**{**found, "times_s": times_s})
 
     def events_s(self, truth: Truth) -> dict[str, float | None]:
         """When object 1's centre turns at the foot and when it meets object 2; None = never.
@@ -115,10 +112,6 @@ def _checked(truth: Truth, motion: Motion) -> Motion:
             f"{dict(truth.effect_values)}"
         )
     return motion
-
-
-def _unit(quaternion: np.ndarray) -> np.ndarray:
-    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
 
 
 def _roll_out_free(truth: Truth, seconds: float) -> Motion:

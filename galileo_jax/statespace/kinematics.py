@@ -62,6 +62,8 @@ def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | No
         return None
     times = observation.times_s
     count, frames = observation.mask.shape
+    step = float(np.median(np.diff(times))) if frames > 1 else 1.0
+    lever_s = step * math.sqrt(sum(2 * k * k for k in range(1, AROUND + 1)))  # errors: m to m/s
     angle, speed, place = np.zeros((3, count, frames))
     moves = np.zeros((count, max(frames - 1, 0)), bool)
     for i in range(count):
@@ -72,9 +74,8 @@ def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | No
             angle[i] = np.where(is_on_ramp, scene.angle_rad, 0.0)
         corner = scene.corner_m[i] if math.isfinite(scene.corner_m[i]) else 0.0
         place[i] = (x - corner) * np.cos(angle[i]) - y * np.sin(angle[i])
-        sd = _noise_m(observation, i)
         speed[i] = np.abs(_slope(times, place[i]))
-        least = max(STILL_M_S, CLEAR * sd / _lever_s(times))
+        least = max(STILL_M_S, CLEAR * _noise_m(observation, i) / lever_s)
         speed[i][speed[i] < least] = 0.0
         moves[i] = (speed[i, 1:] > 0) | (speed[i, :-1] > 0)
     tangent = np.stack([np.cos(angle), -np.sin(angle)], axis=1)
@@ -119,12 +120,6 @@ def _slope(times_s: np.ndarray, place: np.ndarray) -> np.ndarray:
         square = float(t @ t)
         found[frame] = t @ place[own] / square if square > 0 else 0.0
     return found
-
-
-def _lever_s(times_s: np.ndarray) -> float:
-    """A place's error over this is a slope's."""
-    step = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 1.0
-    return step * math.sqrt(sum(2 * k * k for k in range(1, AROUND + 1)))
 
 
 def first_moved(

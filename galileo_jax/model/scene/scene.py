@@ -91,11 +91,6 @@ class Scene:
         """The objects' names."""
         return self.surroundings.names
 
-    @property
-    def has_table(self) -> bool:
-        """Whether the ramp ends on a table."""
-        return math.isfinite(self.surroundings.corner_m[0])
-
 
 def laid_out(
     half_m: Sequence[tuple[float, float]],
@@ -131,12 +126,9 @@ def _spec(surroundings: Surroundings, declared: tuple[Solid, ...]) -> "mujoco.Mj
 
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
     spec.option.gravity = [0, 0, -surroundings.gravity]
-    has_table = math.isfinite(surroundings.corner_m[0])
+    has_table = surroundings.has_table
     if not surroundings.has_surface:
-        for pair in list(spec.pairs):
-            if "ramp" in (pair.geomname1, pair.geomname2):
-                spec.delete(pair)
-        spec.delete(spec.geom("ramp"))
+        _delete_surface(spec, "ramp")
     elif not has_table:
         # The board is where the object is seen to stand, whatever its height.
         (x, y, *_), height = surroundings.start_m[0], surroundings.half_height_m[0]
@@ -166,11 +158,15 @@ def _spec(surroundings: Surroundings, declared: tuple[Solid, ...]) -> "mujoco.Mj
         kind = "sphere" if rolls else declared[i].shape
         _draw(shape, kind, declared[i], length, height)
     if not has_table:
-        for pair in list(spec.pairs):
-            if "table" in (pair.geomname1, pair.geomname2):
-                spec.delete(pair)
-        spec.delete(spec.geom("table"))
+        _delete_surface(spec, "table")
     return spec
+
+
+def _delete_surface(spec: "mujoco.MjSpec", name: str) -> None:
+    for pair in list(spec.pairs):
+        if name in (pair.geomname1, pair.geomname2):
+            spec.delete(pair)
+    spec.delete(spec.geom(name))
 
 
 def _add_object(spec: "mujoco.MjSpec", i: int) -> None:

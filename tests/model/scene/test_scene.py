@@ -156,7 +156,7 @@ def test_objects_stand_in_the_order_of_the_travel(tmp_path):
 def test_one_object_has_no_pair_with_a_second(tmp_path):
     centres = solve(HIT, np.array([0.0])).position_m[:1]
     scene = build_scene(clip(tmp_path, shapes=("box",)), observed(centres))
-    assert scene.has_table
+    assert scene.surroundings.has_table
     assert {scene.model.pair(i).name for i in range(scene.model.npair)} == {
         "object1_ramp",
         "object1_table",
@@ -171,7 +171,7 @@ def test_incline_has_no_table_and_keeps_its_own_line(tmp_path):
     centres = np.array([[0.7 + gone * math.cos(angle), -0.3 - gone * math.sin(angle)]])
     observation = observed(centres, times)
     scene = build_scene(clip(tmp_path, "incline", 22.0, ("box",)), observation)
-    assert not scene.has_table
+    assert not scene.surroundings.has_table
     assert scene.model.npair == 1
     model = Model(scene, 0.4, nuisances=())
     theta = np.array([[0.4, 0.2]])
