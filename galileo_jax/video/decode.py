@@ -220,12 +220,15 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         container = av.open(str(path))
     except av.error.FFmpegError as error:
         raise InputError(
-            f"{path}: cannot be decoded: not a video, without frames, or cut off before its index"
+            f"{path}: cannot be decoded: not a video, or cut off before its index; copy it from "
+            "the camera again"
         ) from error
     with container:
         stream: Any = container.streams.best("video")
         if stream is None:
-            raise InputError(f"{path}: cannot be decoded: without frames; a video expected")
+            raise InputError(
+                f"{path}: cannot be decoded: there are no pictures in it; a video expected"
+            )
         stream.thread_type = "AUTO"
         yield container, stream
 
@@ -350,7 +353,8 @@ def _check_whole(path: Path, scan: _Scan) -> None:
     count, left = len(scan.kinds), int(scan.used.sum())
     if count < MIN_FRAMES:
         raise InputError(
-            f"{path}: only {count} frame(s); a video of at least {MIN_FRAMES} frames expected"
+            f"{path}: only {count} frame(s); a video of the whole motion, at least {MIN_FRAMES} "
+            "frames, expected"
         )
     announced = count + scan.missing
     if scan.missing > max(2, MAX_MISSING_SHARE * announced):
