@@ -102,8 +102,9 @@ class _Verbs(MetaPathFinder, InspectLoader):
 
     def find_spec(self, fullname: str, path: Any, target: Any = None) -> ModuleSpec | None:
         package, _, verb = fullname.rpartition(".")
-        is_verb = package == __name__ and (Path(__file__).parent / f"commands/{verb}.py").is_file()
-        return ModuleSpec(fullname, self) if is_verb else None
+        command = Path(__file__).parent / f"commands/{verb}.py"
+        is_verb = package == __name__ and command.is_file()
+        return ModuleSpec(fullname, self, origin=str(command)) if is_verb else None
 
     def get_source(self, fullname: str) -> str:
         verb = fullname.rpartition(".")[2]
