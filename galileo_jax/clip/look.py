@@ -8,6 +8,7 @@ import numpy as np
 
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.numerics.least_squares import line_through, polynomial
 from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
 STRAIGHT = 0.03
@@ -169,7 +170,7 @@ def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
     """Whether a path is a parabola over x, as of what is thrown, and no ramp with a table."""
     if np.ptp(x) == 0:
         return False
-    left = y - np.polyval(np.polyfit(x - x.mean(), y, 2), x - x.mean())
+    left = polynomial(x - x.mean(), y, 2).left
     return bool(np.ptp(left) <= STRAIGHT * np.hypot(np.ptp(x), np.ptp(y)))
 
 
@@ -189,13 +190,10 @@ def _turns(values: np.ndarray, share: float = 0.1) -> int:
 
 def _straight(x: np.ndarray, y: np.ndarray) -> tuple[bool, float]:
     """(whether a path is straight, its angle against the horizontal, degrees)."""
-    centred = np.stack([x - x.mean(), y - y.mean()])
-    axes, _, _ = np.linalg.svd(centred, full_matrices=False)
-    along = axes[:, 0]
-    across = np.ptp(axes[:, 1] @ centred)
-    return across <= STRAIGHT * np.ptp(along @ centred), math.degrees(
-        math.atan2(abs(along[1]), abs(along[0]))
-    )
+    points = np.stack([x, y])
+    line = line_through(points)
+    is_straight = np.ptp(line.across @ points) <= STRAIGHT * np.ptp(line.along @ points)
+    return bool(is_straight), math.degrees(math.atan2(*np.abs(line.along[::-1])))
 
 
 def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:

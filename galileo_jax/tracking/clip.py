@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from galileo_jax.tracking.contrast import in_contrast
 from galileo_jax.tracking.detect import CameraMovesError, find_movers, fit_outline
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
+from galileo_jax.tracking.picture import OpenFrames
 from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
@@ -78,9 +79,7 @@ def _start(clip: Clip, item: ClipObject) -> Start:
     return replace(first, last_frame=item.last_frame, corrections=later)
 
 
-def _with_points(
-    clip: Clip, open_frames: Callable[[], Iterable[np.ndarray]], advance: Callable[[], None]
-) -> Clip:
+def _with_points(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) -> Clip:
     """The clip with a `point_px` for every object: those not declared go to what moves."""
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
     known = [max(size) for size in sizes if size is not None]

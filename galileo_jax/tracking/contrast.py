@@ -8,19 +8,19 @@ which is largest for the first eigenvector of D. An orange ball before a wall as
 in grey.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
 from jaxtyping import Float
 
+from galileo_jax.tracking.picture import OpenFrames, some_frames
+
 GREY = np.array([0.114, 0.587, 0.299])  # of blue, green, red, as `template.grey` mixes them
-FRAMES, WIDTH_PX = 15, 320  # evenly over the film, made so small
+WIDTH_PX = 320  # frames are made so small
 MOVED = 30.0  # levels; by less noise differs
 LEAST_PIXELS, MOST_SHARE = 30, 0.2  # fewer tell nothing; where more differ the camera moves
 ENOUGH = 0.5  # of the contrast of the best mixture: then grey, whose edges films keep sharper
-
-OpenFrames = Callable[[], Iterable[np.ndarray]]
 
 
 def in_contrast(open_frames: OpenFrames, count: int) -> OpenFrames:
@@ -44,8 +44,7 @@ def in_contrast(open_frames: OpenFrames, count: int) -> OpenFrames:
 
 def _weights(open_frames: OpenFrames, count: int) -> Float[np.ndarray, "3"] | None:
     """Of blue, green and red, their sizes adding up to 1; None: grey shows what moves."""
-    chosen = set(np.linspace(0, count - 1, min(count, FRAMES)).astype(int).tolist())
-    kept = [_small(frame) for index, frame in enumerate(open_frames()) if index in chosen]
+    kept = [_small(frame) for frame in some_frames(open_frames, count)]
     if len(kept) < 3 or kept[0].ndim < 3:
         return None
     off = (kept - np.median(kept, axis=0)).reshape(-1, 3)

@@ -8,7 +8,7 @@ stands on something. Where no features move and nothing flies, it is the silhoue
 farthest.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
+from galileo_jax.tracking.picture import OpenFrames
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.silhouette import Path, paths_of
 from galileo_jax.tracking.template import Outline, grey
@@ -61,7 +62,7 @@ class CameraMovesError(InputError):
 
 
 def find_movers(
-    open_frames: Callable[[], Iterable[np.ndarray]],
+    open_frames: OpenFrames,
     span_px: float,
     *,
     axes_angle_rad: float = 0.0,
@@ -165,7 +166,7 @@ def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int
 
 
 def _feature_paths(
-    open_frames: Callable[[], Iterable[np.ndarray]], advance: Callable[[], None]
+    open_frames: OpenFrames, advance: Callable[[], None]
 ) -> tuple[np.ndarray, tuple[int, int]]:
     """Places `[frame, feature, 2]` of the first frame's features, NaN once lost; frame size."""
     before: np.ndarray | None = None

@@ -1,4 +1,6 @@
-"""A grey frame that is read, smoothed, at any place between its pixels."""
+"""A grey frame that is read, smoothed, at any place between its pixels; and some of a film."""
+
+from collections.abc import Callable, Iterable
 
 import cv2
 import numpy as np
@@ -10,6 +12,17 @@ UPSAMPLED_TO_PX = 2.0  # what is smoothed less than this is kept at twice the fr
 PYRAMID_VARIANCE_PX2 = 0.25  # of OpenCV's `pyrUp`, which smooths half pixels by (1 4 6 4 1) / 16
 LINEAR_SHARE = 1 / 6  # of h^2: the variance of linear interpolation between samples h apart
 SAME_SMEAR_PX, MAX_SMEARED = 0.5, 8  # smears alike to this are made once; so many are kept
+
+SOME_FRAMES = 15  # evenly over a film, show what stands still in it
+
+OpenFrames = Callable[[], Iterable[np.ndarray]]
+"""Gives the frames of a film from its beginning, BGR or grey."""
+
+
+def some_frames(open_frames: OpenFrames, count: int) -> list[np.ndarray]:
+    """`SOME_FRAMES` of the `count` frames of a film."""
+    chosen = set(np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist())
+    return [frame for index, frame in enumerate(open_frames()) if index in chosen]
 
 
 class Picture:

@@ -9,7 +9,6 @@ are not carried along by marks that turn, and are the mean place of what is smea
 known of a turn, and what touches another moving thing is one part with it.
 """
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import cv2
@@ -17,9 +16,9 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.numerics.least_squares import polynomial
+from galileo_jax.tracking.picture import OpenFrames, some_frames
 from galileo_jax.tracking.pose import length
 
-SCENE_FRAMES = 15  # evenly over the film, show the scene: what is elsewhere in most is not in it
 NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or grey levels, is noise
 SMOOTH_PX = 1.0
 LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
@@ -104,11 +103,9 @@ class Path:
         return min(near, 0.5 + 0.5 * back / (TURN_BACK * way + OFF_SIZE * last.size_px))
 
 
-def paths_of(
-    open_frames: Callable[[], Iterable[np.ndarray]], clock: Float[np.ndarray, " frame"]
-) -> list[Path]:
+def paths_of(open_frames: OpenFrames, clock: Float[np.ndarray, " frame"]) -> list[Path]:
     """The paths of all that moves before a scene that stands still; none if the camera moves."""
-    scene = _scene(open_frames, len(clock))
+    scene = _scene(some_frames(open_frames, len(clock)))
     done: list[Path] = []
     going: list[Path] = []
     for index, frame in enumerate(open_frames()):
@@ -130,10 +127,8 @@ def paths_of(
     return done + going
 
 
-def _scene(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> np.ndarray:
+def _scene(kept: list[np.ndarray]) -> np.ndarray:
     """The median of some frames, `[height, width]` or with colours behind, int16."""
-    chosen = set(np.linspace(0, count - 1, min(count, SCENE_FRAMES)).astype(int).tolist())
-    kept = [frame for index, frame in enumerate(open_frames()) if index in chosen]
     rows = [np.median([one[row] for one in kept], axis=0) for row in range(len(kept[0]))]
     return np.array(rows, np.int16)
 

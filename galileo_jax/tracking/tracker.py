@@ -1,6 +1,6 @@
 """Tracking a video in two passes."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.fragments import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.motion_compensation import Coding
-from galileo_jax.tracking.picture import Picture
+from galileo_jax.tracking.picture import OpenFrames, Picture
 from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
 from galileo_jax.tracking.second_opinion import (
@@ -23,8 +23,6 @@ from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
-FIELDS = tuple(field.name for field in fields(Finished))
-
 
 @dataclass(frozen=True)
 class Seen:
@@ -35,7 +33,7 @@ class Seen:
 
 
 def track_video(
-    open_frames: Callable[[], Iterable[np.ndarray]],
+    open_frames: OpenFrames,
     starts: Sequence[Start],
     times_s: np.ndarray,
     *,
@@ -71,7 +69,8 @@ def track_video(
     if len(objects) == 1 and needs_silhouette(objects[0], starts[0]):
         # Those of two objects that touch are one, whose middle is neither's.
         objects = [_second_look(objects[0], starts[0], open_frames, clock)]
-    stacked = {name: np.stack([getattr(item, name) for item in objects]) for name in FIELDS}
+    names = [field.name for field in fields(Finished)]
+    stacked = {name: np.stack([getattr(item, name) for item in objects]) for name in names}
     return Track(
         names=tuple(start.name for start in starts),
         times_s=times_s[:count],
@@ -82,10 +81,7 @@ def track_video(
 
 
 def _second_look(
-    found: Finished,
-    start: Start,
-    open_frames: Callable[[], Iterable[np.ndarray]],
-    clock: np.ndarray,
+    found: Finished, start: Start, open_frames: OpenFrames, clock: np.ndarray
 ) -> Finished:
     """The track with silhouettes, in colour if that shows the object in more frames by a tenth.
 
@@ -111,7 +107,7 @@ class _FirstPass:
 
 
 def _from_frame_to_frame(
-    open_frames: Callable[[], Iterable[np.ndarray]],
+    open_frames: OpenFrames,
     starts: Sequence[Start],
     clock: np.ndarray,
     advance: Callable[[Seen | None], None],
@@ -135,7 +131,7 @@ def _from_frame_to_frame(
 
 def _in_every_frame(
     first: _FirstPass,
-    open_frames: Callable[[], Iterable[np.ndarray]],
+    open_frames: OpenFrames,
     clock: np.ndarray,
     advance: Callable[[Seen | None], None],
 ) -> tuple[list[float], list[list[Refined | None]]]:
@@ -174,10 +170,7 @@ def _final_template(follower: Follower) -> Template:
 
 
 def _learnt(
-    first: _FirstPass,
-    looks: Sequence[_Look],
-    open_frames: Callable[[], Iterable[np.ndarray]],
-    clock: np.ndarray,
+    first: _FirstPass, looks: Sequence[_Look], open_frames: OpenFrames, clock: np.ndarray
 ) -> list[float]:
     """The open share of a frame's time for each piece, where the first pass has not learned it.
 

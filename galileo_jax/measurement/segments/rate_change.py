@@ -15,7 +15,8 @@ from galileo_jax.observation.observation import Observation, PointPath
 
 LEAST, CLEAR = 1.5, 4.0  # factor of the velocity; standard deviations
 STRAIGHT, UNLIKE = 0.98, 0.3  # cosine between the velocities; share of the accelerations
-FRAMES, FEWEST = 20, 8  # on either side
+FEWEST = 8  # places on either side
+REACHES = (20, FEWEST)  # the shorter not to where it is at rest or struck
 MOST_LEFT = 3.0  # times the stated variance
 SMEARED = 1  # steps in which the clock changes
 
@@ -28,36 +29,31 @@ def rate_change(observation: Observation) -> tuple[int, float] | None:
     path, found = observation.path(), []
     for at in range(FEWEST, len(path) - FEWEST - SMEARED + 1):
         middle_s = (path.times_s[at - 1] + path.times_s[at]) / 2
-        starts, ends = _reaches(at, -1), _reaches(at + SMEARED, 1)
-        first, before = _longest([(max(n, 0), path[max(n, 0) : at]) for n in starts], middle_s)
-        last, after = _longest([(n, path[at + SMEARED : n]) for n in ends], middle_s)
+        before = _smooth([path[max(at - n, 0) : at] for n in REACHES], middle_s)
+        after = _smooth([path[at + SMEARED : at + SMEARED + n] for n in REACHES], middle_s)
         if max(before.left, after.left) < MOST_LEFT and (factor := _factor(before, after)):
-            both = path[first:last]
+            both = path[at - before.places : at + SMEARED + after.places]
             if not _kinked_left(both, float(np.median(path.variance_m2))) < MOST_LEFT:
                 found.append((before.left + after.left, int(path.frames[at - 1]), factor))
     return min(found)[1:] if found else None
 
 
-def _reaches(at: int, way: int) -> list[int]:
-    """To where a side may reach: all the way, or not to where it is at rest or struck."""
-    return [at + way * FRAMES, at + way * FEWEST]
-
-
-def _longest(sides: list[tuple[int, PointPath]], middle_s: float) -> tuple[int, "_Parabola"]:
-    """Where the first side ends of which a parabola leaves noise alone, or the last; and that."""
-    found = ((end, _parabola(side, middle_s)) for end, side in sides[:-1])
-    good = next(((end, one) for end, one in found if one.left < MOST_LEFT), None)
-    return good or (sides[-1][0], _parabola(sides[-1][1], middle_s))
+def _smooth(sides: list[PointPath], middle_s: float) -> "_Parabola":
+    """Of the first side of which a parabola leaves noise alone, or of the last."""
+    found = (_parabola(side, middle_s) for side in sides[:-1])
+    good = next((one for one in found if one.left < MOST_LEFT), None)
+    return good or _parabola(sides[-1], middle_s)
 
 
 class _Parabola(NamedTuple):
-    """At some time, m and s; `left` is the variance that it leaves, over the stated one."""
+    """At some time, m and s, through so many `places`; `left`: variance over the stated one."""
 
     velocity: np.ndarray
     acceleration: np.ndarray
     velocity_sd: float
     acceleration_sd: float
     left: float
+    places: int
 
 
 def _parabola(path: PointPath, middle_s: float) -> _Parabola:
@@ -65,7 +61,8 @@ def _parabola(path: PointPath, middle_s: float) -> _Parabola:
     variance = float(np.median(path.variance_m2))
     left = float(np.sum(fit.left**2)) / ((len(path) - 3) * len(path.place_m) * variance)
     sds = np.sqrt(variance * max(left, 1.0) * np.diagonal(fit.inverse))
-    return _Parabola(fit.solution[1], 2 * fit.solution[0], float(sds[1]), 2 * float(sds[0]), left)
+    (bend, velocity, _), (bend_sd, velocity_sd, _) = fit.solution, sds.tolist()
+    return _Parabola(velocity, 2 * bend, velocity_sd, 2 * bend_sd, left, len(path))
 
 
 def _kinked_left(path: PointPath, variance_m2: float) -> float:
