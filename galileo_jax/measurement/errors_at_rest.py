@@ -16,9 +16,6 @@ rests have on average, as if one window more had shown it. Beside those that las
 error of LEAST_SCALE of the stated one or more: a picture that a coder froze is no better known.
 What has come to rest is besides off by one shift of all its frames: however many there are, they do
 not average it out. Of twice as long a rest before all motion, or after it, only `MOST` frames stay.
-
-Source: Patterson and Thompson (1971), Recovery of inter-block information when block sizes are
-unequal, Biometrika 58, 545 (the likelihood of covariances, without the mean).
 """
 
 from collections.abc import Sequence
@@ -29,6 +26,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri, logsumexp
 
+from galileo_jax.numerics.least_squares import restricted_likelihood
 from galileo_jax.numerics.random_patterns import random_patterns
 from galileo_jax.numerics.runs import stretches
 from galileo_jax.observation.observation import AWAY_M, Observation
@@ -184,13 +182,8 @@ def _likelihood(
     """Of a piece without its place: log-determinant and sum of squares, for v = 1."""
     size = len(place_m)
     covers = FRESH * np.eye(size) + (1 - FRESH) * _kernels(size)
-    root = np.linalg.cholesky(np.array([np.eye(size), *covers]))
-    both = np.linalg.solve(root, np.column_stack([1 / sd_m, (place_m - place_m.mean()) / sd_m]))
-    still, white = both[..., 0], both[..., 1]
-    information = np.sum(still**2, axis=-1)
-    square = np.sum(white**2, axis=-1) - np.sum(still * white, axis=-1) ** 2 / information
-    determinant = 2 * np.log(np.einsum("...nn->...n", root)).sum(axis=-1) + np.log(information)
-    return determinant, square
+    away = (place_m - place_m.mean()) / sd_m
+    return restricted_likelihood(np.array([np.eye(size), *covers]), 1 / sd_m[:, None], away)
 
 
 def _kernels(size: int) -> Float[np.ndarray, "tau frame frame"]:

@@ -25,6 +25,7 @@ from scipy.special import logsumexp
 
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.clip.walls import Wall
+from galileo_jax.numerics.least_squares import restricted_likelihood
 from galileo_jax.numerics.line_segments import nearest_frames
 from galileo_jax.observation.observation import Observation
 
@@ -112,13 +113,7 @@ def _evidence(
     error = SCALES[:, None, None] ** 2 * np.diag(variance_m2) / unit**2
     path = PATHS[:, None, None] ** 2 * smooth_path(since)
     cover = wander[:, None, None] + error[:, None] + path  # [size, scale, path, frame, frame]
-    root = np.linalg.cholesky(cover)
-    both = np.linalg.solve(root, np.column_stack([np.vander(since, 3), place_m / unit]))
-    basis, upper = np.linalg.qr(both[..., :3])
-    along = np.einsum("...nk,...n->...k", basis, both[..., 3])
-    square = np.sum(both[..., 3] ** 2, axis=-1) - np.sum(along**2, axis=-1)
-    logs = np.log(np.einsum("...nn->...n", root)).sum(-1)
-    logs += np.log(np.abs(np.einsum("...nn->...n", upper))).sum(-1)
-    log_density = -logs - square / 2 - (size - 3) * np.log(unit)
+    determinant, square = restricted_likelihood(cover, np.vander(since, 3), place_m / unit)
+    log_density = -(determinant + square) / 2 - (size - 3) * np.log(unit)
     prior = -0.5 * (np.log(SCALES) / SCALE_SD) ** 2
     return np.asarray(logsumexp(log_density + prior[:, None], axis=(1, 2)))

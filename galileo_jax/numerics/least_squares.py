@@ -34,6 +34,27 @@ def polynomial(since_s: Float[np.ndarray, " row"], values: np.ndarray, degree: i
     return least_squares(np.vander(since_s, degree + 1), values)
 
 
+def restricted_likelihood(
+    cover: Float[np.ndarray, "*model row row"],
+    design: Float[np.ndarray, "row term"],
+    values: Float[np.ndarray, " row"],
+) -> tuple[Float[np.ndarray, "*model"], Float[np.ndarray, "*model"]]:
+    """Of values ~ N(design b, cover), b averaged over: the log-determinant and sum of squares.
+
+        log density = -(log-determinant + sum of squares) / 2 + constant
+
+    Source: Patterson and Thompson (1971), Recovery of inter-block information when block sizes
+    are unequal, Biometrika 58, 545.
+    """
+    root = np.linalg.cholesky(cover)
+    white = np.linalg.solve(root, np.column_stack([design, values]))
+    basis, upper = np.linalg.qr(white[..., :-1])
+    along = np.einsum("...nk,...n->...k", basis, white[..., -1])
+    square = np.sum(white[..., -1] ** 2, axis=-1) - np.sum(along**2, axis=-1)
+    scale, spread = (np.abs(np.einsum("...nn->...n", each)) for each in (root, upper))
+    return 2 * (np.log(scale).sum(axis=-1) + np.log(spread).sum(axis=-1)), square
+
+
 class Line(NamedTuple):
     """The straight line of least summed squared distances from points of a plane.
 

@@ -18,6 +18,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize_scalar
 
+from galileo_jax.numerics.least_squares import LinearFit, least_squares
 from galileo_jax.observation.observation import Observation
 
 EARLY = 0.5  # of the way
@@ -40,9 +41,10 @@ def start_speed(observation: Observation) -> StartSpeed | None:
     if early is None:
         return None
     powers = np.vander(early.times_s, TERMS, increasing=True)
-    moving, moves_cost, spread = early.least_squares(powers)
+    fit = early.fit(powers)
+    moving, moves_cost = fit.solution, float(np.sum(fit.left**2))
     size = early.scatter(moves_cost)
-    sd_m_s = math.sqrt(size * spread[1, 1])
+    sd_m_s = math.sqrt(size * fit.inverse[1, 1])
     in_a_step = max(2 * float(moving[2]), 0.0) * float(np.median(np.diff(early.times_s)))
     if moving[1] - CLEAR * sd_m_s < in_a_step:
         return None
@@ -81,13 +83,9 @@ class _Way(NamedTuple):
     sd_m: np.ndarray
     sign: float  # -1: it first goes against the way of all
 
-    def least_squares(self, design: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-        """The solution, the sum of its squared errors in units of their sd, and its covariance."""
-        white = design / self.sd_m[:, None]
-        inverse = np.linalg.pinv(white)
-        solution = inverse @ (self.way_m / self.sd_m)
-        cost = float(np.sum((self.way_m / self.sd_m - white @ solution) ** 2))
-        return solution, cost, inverse @ inverse.T
+    def fit(self, design: np.ndarray) -> LinearFit:
+        """What a design makes of it, in units of the sds."""
+        return least_squares(design / self.sd_m[:, None], self.way_m / self.sd_m)
 
     def scatter(self, cost: float) -> float:
         """The variance of errors over the stated one, at least 1."""
@@ -96,7 +94,7 @@ class _Way(NamedTuple):
     def release_cost(self, release_s: float) -> float:
         """The least sum of squared errors of a release from rest at an instant."""
         powers = np.vander(np.maximum(self.times_s - release_s, 0.0), TERMS, increasing=True)
-        return self.least_squares(np.delete(powers, 1, axis=1))[1]
+        return float(np.sum(self.fit(np.delete(powers, 1, axis=1)).left ** 2))
 
     def let_go(self) -> tuple[float, float]:
         """The least of these in the clip, and its instant, s."""
