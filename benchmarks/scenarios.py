@@ -79,7 +79,7 @@ class OnRamp:
             track = Path(folder) / "clip.csv"
             simulate(track, track_only=True, solver="fine", seed=seed, **self.options)
             clip = load_clip(track)
-            measured, truth = measure(clip), true_parameters(clip)
+            measured, truth = measure(clip), true_parameters(clip.path)
         # Masses alone never show; their ratios do.
         told = {name: value for name, value in truth.items() if name[:1] != "m" or "_" in name}
         return measured.clip, measured.observation, told

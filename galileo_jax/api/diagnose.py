@@ -4,6 +4,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,7 @@ class Diagnosis:
             self.found,
             self.document,
             clips,
-            truth=hidden_effect(clips[0]),
+            truth=hidden_effect(clips[0].path),
             command=self.command,
             next_command=self.next_command(Path(path).parent),
             seed=int(self.document["seed"]),
@@ -257,8 +258,6 @@ class Diagnosis:
         return f"<Diagnosis {names}: {self.sentence}>"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         table = self.rounds._repr_html_()  # pyright: ignore
         return f"<p>{escape(self.sentence)}</p>{table}"
 

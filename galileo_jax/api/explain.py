@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -140,8 +141,6 @@ class Explanation:
         return f"<Explanation {', '.join(self.fit.names)}: {self.paragraph}>"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<p>{escape(self.paragraph)}</p>{self.fit._repr_html_()}"
 
 

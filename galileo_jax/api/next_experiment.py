@@ -4,6 +4,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -90,8 +91,6 @@ class NextExperiment:
         return f"<NextExperiment: {self.sentence}>"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return f"<p>{escape(self.sentence)}</p>{self.table.head(10)._repr_html_()}"  # pyright: ignore
 
 

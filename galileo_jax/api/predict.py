@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -95,8 +96,6 @@ class Prediction:
         return f"<Prediction {self.run.problem.name}: {' '.join(self.sentences)}>"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         return "".join(f"<p>{escape(sentence)}</p>" for sentence in self.sentences)
 
 

@@ -19,7 +19,7 @@ def main(argv: Sequence[str]) -> None:
     asked = _parser().asked(argv)
     clips = clip_options.load_clips(asked.pop("tracks"), asked.get("pixels_per_metre"))
     out = clip_options.out_folder(asked.pop("out", None), clips, "diagnosis")
-    svg, hidden = asked.pop("svg", False), hidden_effect(clips[0])
+    svg, hidden = asked.pop("svg", False), hidden_effect(clips[0].path)
     with command.progress_display() as display:
         rows: list[Mapping[str, Any]] = []
 

@@ -60,7 +60,7 @@ def main(argv: Sequence[str]) -> None:
             _bundle_failure(files, said, to, words, error)
         raise
     print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
-    print(f"\n{fit_table(found.fit, true_parameters(found.fit.measurements[0].clip))}")
+    print(f"\n{fit_table(found.fit, true_parameters(found.fit.measurements[0].clip.path))}")
     notes_on(found.fit, out)
     command.say(", ".join(map(str, found.files)))
     if is_bundled:

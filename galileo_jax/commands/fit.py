@@ -19,7 +19,7 @@ def main(argv: Sequence[str]) -> None:
     refuse(asked, ignored, why)
     clips = clip_options.load_clips(asked.pop("tracks"), asked.pop("pixels_per_metre", None))
     out = clip_options.out_folder(asked.pop("out", None), clips)
-    truth = true_parameters(clips[0])
+    truth = true_parameters(clips[0].path)
     with command.progress_display() as display:
         from galileo_jax.results.run import CHECKPOINT
         from galileo_jax.results.stale_outputs import PREDICTION

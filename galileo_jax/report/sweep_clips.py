@@ -94,16 +94,12 @@ def middle_frame(observation: Observation) -> int:
 
     Distances are summed over the objects. Without any motion: the middle of the track.
     """
-    position = np.where(observation.mask[:, None], observation.position_m[:, :2], np.nan)
-    away = np.zeros(position.shape[-1])
-    for i, is_seen in enumerate(observation.mask):
+    frames = np.arange(observation.position_m.shape[-1])
+    away = np.zeros(len(frames))
+    for position, is_seen in zip(observation.position_m[:, :2], observation.mask, strict=True):
         if is_seen.any():
-            first = position[i][:, int(np.argmax(is_seen))]
-            distance = np.hypot(*(position[i] - first[:, None]))
-            distance[~is_seen] = np.interp(
-                np.flatnonzero(~is_seen), np.flatnonzero(is_seen), distance[is_seen]
-            )
-            away += distance
+            seen = position[:, is_seen]
+            away += np.interp(frames, frames[is_seen], np.hypot(*(seen - seen[:, :1])))
     if not away.any():
         return len(away) // 2
     return int(np.argmax(away >= 0.5 * away.max()))

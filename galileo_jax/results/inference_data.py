@@ -21,6 +21,7 @@ of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (
 leave-one-out cross-validation for large data, ICML.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import jax
@@ -83,7 +84,11 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     measurement = _measurement(trials)
     along = ("chain", "draw", "measurement")
     indices, theta = _thinned(posterior, NUM_PREDICTIVE_DRAWS)
-    predicted = _predictive(trials, theta.reshape(-1, theta.shape[-1]), rng)
+    predicted = _of_clips(
+        trials,
+        theta.reshape(-1, theta.shape[-1]),
+        lambda data, position, scale: position + noise_draws(rng, scale, data),
+    )
     nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
     if _is_weighed(posterior):
         nats["importance_ess"] = f"{posterior.provenance[ESS]:.3g}"
@@ -93,7 +98,13 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
         nats["importance_pareto_k"] = f"{pareto_k:.3g}"
     else:
         like_indices, like_theta = _thinned(posterior, NUM_LIKELIHOOD_DRAWS)
-    density = _log_likelihood(trials, like_theta.reshape(-1, theta.shape[-1]))
+    density = _of_clips(
+        trials,
+        like_theta.reshape(-1, theta.shape[-1]),
+        lambda data, position, scale: conditional_log_density(
+            data.observed_m - position, scale, data
+        ),
+    )
 
     def group(values: np.ndarray, at: np.ndarray, attrs: dict[str, str]) -> "xr.Dataset":
         shaped = values.reshape(-1, len(at), values.shape[-1])
@@ -202,20 +213,12 @@ def _noise_scales(trials: JointProblem, theta: np.ndarray, clip: int) -> np.ndar
     return theta[:, len(trials.model_parameters) + clip]
 
 
-def _predictive(trials: JointProblem, theta: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Replicates of what was measured, `[draw, measurement]`, m."""
-    replicates = []
-    for clip, problem in enumerate(trials.problems):
-        noise = noise_draws(rng, _noise_scales(trials, theta, clip), problem.data)
-        replicates.append(_positions(trials, theta, clip) + noise)
-    return _chosen(trials, replicates)
-
-
-def _log_likelihood(trials: JointProblem, theta: np.ndarray) -> np.ndarray:
-    """Log p(y_i | y_-i), `[draw, measurement]`."""
-    densities = []
-    for clip, problem in enumerate(trials.problems):
-        difference = problem.data.observed_m - _positions(trials, theta, clip)
-        scale = _noise_scales(trials, theta, clip)
-        densities.append(conditional_log_density(difference, scale, problem.data))
-    return _chosen(trials, densities)
+def _of_clips(
+    trials: JointProblem, theta: np.ndarray, function: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """What a function of a clip's data, positions and noise scales gives, `[draw, measurement]`."""
+    values = [
+        function(problem.data, _positions(trials, theta, clip), _noise_scales(trials, theta, clip))
+        for clip, problem in enumerate(trials.problems)
+    ]
+    return _chosen(trials, values)

@@ -2,23 +2,21 @@
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.runtime.errors import InputError
 
-if TYPE_CHECKING:
-    from galileo_jax.clip.schema import Clip
-
 Told = TypeVar("Told")
 
 
-def true_parameters(clip: "Clip") -> dict[str, float]:
+def true_parameters(clip: Path) -> dict[str, float]:
     """What NAME.truth.json beside a synthetic clip says of its parameters; {} without."""
     return _told(clip, "m1, k1, m2 and k2", _parameters) or {}
 
 
-def hidden_effect(clip: "Clip") -> str | None:
+def hidden_effect(clip: Path) -> str | None:
     """What NAME.truth.json beside a synthetic clip says was hidden in it; None without."""
     return _told(clip, "an effect", lambda content: str(content["effect"]))
 
@@ -31,8 +29,8 @@ def _parameters(content: Any) -> dict[str, float]:
     return known | mass_ratios([known[f"m{n}"] for n in numbers])
 
 
-def _told(clip: "Clip", what: str, read: Callable[[Any], Told]) -> Told | None:
-    path = clip.path.with_suffix(".truth.json")
+def _told(clip: Path, what: str, read: Callable[[Any], Told]) -> Told | None:
+    path = clip.with_suffix(".truth.json")
     if not path.is_file():
         return None
     try:
@@ -41,5 +39,5 @@ def _told(clip: "Clip", what: str, read: Callable[[Any], Told]) -> Told | None:
         raise InputError(f"{path}: not JSON ({error})") from error
     try:
         return read(content)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
         raise InputError(f"{path}: not a truth with {what} ({error})") from error

@@ -222,7 +222,7 @@ def _run(
         from galileo_jax.studio import work
 
         with scope(on_progress, cancel):
-            content = work.TASKS[task](**given)
+            content = getattr(work, task)(**given)
         send(Message(number, task, "done", content))
     except Cancelled:
         send(Message(number, task, "cancelled"))

@@ -1,4 +1,4 @@
-"""The jobs: each calls functions of the API, writes what the commands write, and returns a view.
+"""The jobs by name: each calls the API, writes what the commands write, and returns a view.
 
 What is there before the end is reported with the progress.
 
@@ -7,7 +7,7 @@ are asked for again are kept in its memory.
 """
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -190,12 +190,3 @@ def _keep(key: str, run: str, fit: gx.Fit) -> None:
     _fits[key] = fit
     stamp = (Path(run) / "result.json").stat().st_mtime_ns
     _fits[f"{run} {stamp}"] = fit
-
-
-TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
-    one.__name__: one
-    for one in (
-        propose, understand, explain, track, fit, compare, diagnose, predict, export, open_run,
-        simulate,
-    )
-}  # fmt: skip

@@ -4,12 +4,7 @@ A worker that dies (memory, a crash in native code) takes nothing with it: its t
 is given to a new worker, and fails only when that has died as well. Workers end with the
 process that started them, however that ends.
 
-loky (3.7.0, with 2 workers) was tried in its place and breaks two of these promises. After
-`kill -9` of the parent its workers were still there 20 s later (ours: gone after 0.02 s), those of
-`get_reusable_executor` and those of one executor per worker alike. And when a worker of
-`get_reusable_executor` dies, all tasks at work are lost with it: a task of 3 s beside one that
-killed its process every time was begun three times and reported as died itself. Only one executor
-per worker loses its own task alone. With both, Ctrl-C ended the workers at once.
+loky in its place breaks two of these promises (docs/history/speed.md).
 """
 
 import multiprocessing

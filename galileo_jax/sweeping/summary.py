@@ -4,7 +4,7 @@ It holds nothing of when and where a cell was computed, so that a sweep that was
 taken up again ends with the same table, to the last digit.
 """
 
-import json
+import contextlib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -14,6 +14,8 @@ from typing import Any
 from galileo_jax.files.tables import TABLE_FORMATS, write_table
 from galileo_jax.report.sweep_clips import verdict_words
 from galileo_jax.results.shown import headlines, point_estimate
+from galileo_jax.results.truth import hidden_effect, true_parameters
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.settings import Diagnose, Explain
 from galileo_jax.sweeping.store import Store
@@ -48,13 +50,9 @@ def read_truth(clip: Path) -> dict[str, Any]:
     It is shown beside what was found, and nothing else is done with it; one that is damaged
     counts as none.
     """
-    try:
-        content = json.loads(clip.with_suffix(".truth.json").read_text(encoding="utf-8"))
-        truth = {key: float(content[key]) for key in ("k1", "k2")}
-        truth["mass_ratio"] = float(content["m1"]) / float(content["m2"])
-        return truth | {"hidden": str(content.get("effect", NONE))}
-    except (OSError, ValueError, KeyError, TypeError, ZeroDivisionError):
-        return {}
+    with contextlib.suppress(InputError):
+        return {**true_parameters(clip), "hidden": hidden_effect(clip)}
+    return {}
 
 
 def write_tables(folder: Path, rows: Sequence[Row]) -> list[Path]:
