@@ -43,22 +43,24 @@ class Discovery:
     @property
     def status(self) -> str | None:
         """Of the last verdict: none, named, ambiguous, law, unknown; None without any."""
-        rounds = self.document["rounds"]
-        return rounds[-1]["status"] if rounds else None
+        return self._last.get("status")
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Of the last verdict."""
-        rounds = self.document["rounds"]
-        return tuple(rounds[-1]["effects"]) if rounds else ()
+        return tuple(self._last.get("effects", ()))
 
     @property
     def sentence(self) -> str:
         """The result in one sentence."""
         made = len(self.document["experiments"])
-        rounds = self.document["rounds"]
-        said = rounds[-1]["sentence"] if rounds else "No experiment delivered a track."
+        said = self._last.get("sentence", "No experiment delivered a track.")
         return f"After {made} experiment{'' if made == 1 else 's'}: {said}"
+
+    @property
+    def _last(self) -> Mapping[str, Any]:
+        rounds = self.document["rounds"]
+        return rounds[-1] if rounds else {}
 
     @property
     def experiments(self) -> "pd.DataFrame":

@@ -18,7 +18,6 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import with_shared_parameters
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import Measurement, inferred
-from galileo_jax.model.parameters import inverse
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.report.fit_charts import fit_chart
 from galileo_jax.report.fit_page import PAGE, write_report
@@ -53,8 +52,6 @@ class Fit:
       posterior: draws of all parameters, in their units.
       result: result.json: `parameters`, `derived`, `nuisances`, `error`, ...; the keys are in
         docs/reference/result_files.md.
-      z_best: `[parameter]`, the best fit, in the search space; None of a run that an
-        earlier version wrote.
       gradient: the gradient fit that the posterior came from; None where there was none.
       exact: the gradient fit in an exact world, whether or not that is what is told; None of a run
         that was read.
@@ -65,7 +62,6 @@ class Fit:
     problem: JointProblem
     posterior: Posterior
     result: Mapping[str, Any]
-    z_best: np.ndarray | None = None
     gradient: GradientFit | None = None
     exact: GradientFit | None = None
     folder: Path | None = None
@@ -157,16 +153,14 @@ class Fit:
         Raises:
           InputError: a name is no parameter of the model.
         """
-        best = self.problem.theta(self._z())
+        best = self.problem.theta(self.z_best)
         theta = replaced(self.problem, best, values)
         return motions_at(self.problem, [one.clip for one in self.measurements], theta, best)
 
-    def _z(self) -> np.ndarray:
-        """The best fit; of a run that an earlier version wrote the posterior's median."""
-        if self.z_best is not None:
-            return self.z_best
-        median = np.median(self.posterior.flat(), axis=0)
-        return inverse(self.problem.parameters, np.asarray(median))
+    @property
+    def z_best(self) -> np.ndarray:
+        """`[parameter]`, the best fit, in the search space."""
+        return np.array(self.posterior.provenance[BEST])
 
     def runs(self, folder: Path) -> tuple[Run, ...]:
         """The fit of every clip, as `save` leaves it in `folder` and below."""
@@ -181,7 +175,7 @@ class Fit:
         """One clip of a joint fit, with the joint posterior of its parameters."""
         one, alone = self.measurements[index], self.problem.alone(index)
         columns = self.problem.columns_of(index)
-        z = self._z()[columns]
+        z = self.z_best[columns]
         own = self.posterior.chosen(columns, alone.names)
         own = replace(own, provenance={**own.provenance, BEST: [float(value) for value in z]})
         result = make_result(
@@ -350,7 +344,7 @@ def make_fit(
         result["warnings"] = [*result.get("warnings", []), *others]
     if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = taken
-    return Fit(tuple(measurements), problem, posterior, result, z_best, gradient, found.exact)
+    return Fit(tuple(measurements), problem, posterior, result, gradient, found.exact)
 
 
 OF_RESULT = {  # what `make_result` writes by itself
@@ -397,6 +391,4 @@ def load_run(folder: str | Path, *, engine: str = "auto") -> Fit:
         # Known by the name of what was fitted, not by that of the run's own copy, clip.yaml.
         named_so = {"source": source, "path": Path(source).with_suffix(".yaml")}
         measurements.append(Measurement(run.clip.model_copy(update=named_so), seen, seen))
-    best = posterior.provenance.get(BEST)
-    z_best = None if best is None else np.array(best)
-    return Fit(tuple(measurements), problem, posterior, result, z_best, folder=folder)
+    return Fit(tuple(measurements), problem, posterior, result, folder=folder)

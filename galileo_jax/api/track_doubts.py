@@ -30,28 +30,24 @@ def with_track_doubts(
     measurements: Sequence[Measurement], result: Mapping[str, Any]
 ) -> dict[str, Any]:
     """The result with its status and warnings saying so where the tracks cannot be trusted."""
-    wrong = [str(one) for measured in measurements for one in measured.astray]
-    found, chi2 = dict(result), result["error"]["chi2_per_dof"]
-    if not wrong and not chi2 <= FAR:
-        wrong = [f"no motion of this model comes close to the track (chi2 {chi2:.0f})"]
-        found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
+    wrong = ", ".join(str(one) for measured in measurements for one in measured.astray)
+    chi2, warning = result["error"]["chi2_per_dof"], ""
     percent = result["error"].get("rms_percent_of_way") or 0.0
-    if not wrong and percent > MOST_OFF_PERCENT:
-        off = f"the best motion stays {percent:.0f} % of the way moved from the track"
-        wrong = [off]
-        found["warnings"] = [*result.get("warnings", []), f"{off}: {_look_at(measurements)}"]
+    if not wrong and not chi2 <= FAR:
+        wrong = f"no motion of this model comes close to the track (chi2 {chi2:.0f})"
+        warning = (
+            f"chi2 per degree of freedom is {chi2:.0f}: before you conclude that a force is "
+            "missing, "
+        )
+    elif not wrong and percent > MOST_OFF_PERCENT:
+        wrong = f"the best motion stays {percent:.0f} % of the way moved from the track"
+        warning = f"{wrong}: "
+    found = dict(result)
+    if warning:
+        found["warnings"] = [*result.get("warnings", []), f"{warning}{_look_at(measurements)}"]
     if wrong:
-        said = [result["status"]] if result.get("status") else []
-        found["status"] = "; but ".join([*said, ", ".join(wrong)])
+        found["status"] = "; but ".join(filter(None, [result.get("status"), wrong]))
     return found
-
-
-def _far(measurements: Sequence[Measurement], chi2: float) -> str:
-    """What to look at where chi2 is in the thousands and no track is seen to go astray."""
-    return (
-        f"chi2 per degree of freedom is {chi2:.0f}: before you conclude that a force is missing, "
-        f"{_look_at(measurements)}"
-    )
 
 
 def _look_at(measurements: Sequence[Measurement]) -> str:

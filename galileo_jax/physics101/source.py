@@ -27,10 +27,6 @@ def _load(path: Path, given: dict[str, Any]) -> Clip:
     return check_place(place, read_labels(place.labels), given)
 
 
-def _label(path: Path, declared: Declaration) -> LabelledClip:
-    return label_place(_place(path), declared)
-
-
 def _files(path: Path) -> SourceFiles:
     """A label of another clip does not make it another."""
     place = _place(path)
@@ -51,12 +47,13 @@ def _place(path: Path) -> Place:
     return place
 
 
-def label_place(place: Place, declared: Declaration) -> LabelledClip:
+def _label(path: Path, declared: Declaration) -> LabelledClip:
     """Writes into the labels of Physics 101: sizes by object, all else for one of the folders.
 
     Raises:
       InputError: nothing is declared, or the clip would be wrong; nothing is written then.
     """
+    place = _place(path)
     if declared.scenario is not None:
         raise InputError(f"--scenario: the folders of {place.video} say {place.scenario}")
     old = read_labels(place.labels)

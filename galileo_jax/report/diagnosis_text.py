@@ -160,15 +160,10 @@ def _without_company(hypotheses: Sequence[Sequence[str]]) -> tuple[list[str], li
 
 
 def formula_text(record: Mapping[str, Any]) -> str:
-    """What the best formula says of the missing force, in one sentence.
-
-    Empty where no force is missing, and for a file from before formulas were fitted in the model.
-    """
-    missing = record.get("missing_force") or {}
-    if "best_formula" not in missing:
+    """What the best formula says of the missing force, in one sentence; empty where none is."""
+    if (missing := record.get("missing_force")) is None:
         return ""
-    best = missing["best_formula"]
-    if best is None:
+    if (best := missing["best_formula"]) is None:
         return "No short formula was found that could explain the missing force."
     leaves = (
         f"{p_equals(best['p_value'])}, chi2 per degree of freedom {best['chi2_per_dof']:.2f}, "

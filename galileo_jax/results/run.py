@@ -61,14 +61,8 @@ class Run:
 
     @property
     def best(self) -> np.ndarray:
-        """`[parameter]`, the best fit in the parameters' units.
-
-        Of a run that an earlier version wrote the posterior's medians.
-        """
-        z = self.posterior.provenance.get(BEST)
-        if z is None:
-            return np.median(self.posterior.flat(), axis=0)
-        return self.trials.theta(np.asarray(z))
+        """`[parameter]`, the best fit in the parameters' units."""
+        return self.trials.theta(np.asarray(self.posterior.provenance[BEST]))
 
 
 def save_run(

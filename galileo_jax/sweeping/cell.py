@@ -118,10 +118,7 @@ class Unpacked:
 
     def origin(self, path: Path) -> Path:
         """Where a file that is here came from."""
-        for here, there in self.origins.items():
-            if path.is_relative_to(here):
-                return there / path.relative_to(here)
-        return path
+        return Path(self.text_of_origin(str(path)))
 
     def text_of_origin(self, text: str) -> str:
         """A message with the names of files as they were where they came from."""

@@ -106,34 +106,21 @@ class Thesis(AbstractSampler):
         return moved, Info(rate, is_accepted)
 
 
-class ThesisResult(NamedTuple):
-    """The thesis's answer.
-
-    Attributes:
-      estimate: `[dim]`, in (0, 1); a point, without an interval.
-      posterior: all states of all chains; with acceptance "coin" no posterior at all.
-    """
-
-    estimate: np.ndarray
-    posterior: Posterior
-
-
 def infer(
     key: jax.Array,
     log_similarity: LogDensity,
     names: Sequence[str] = SEARCHED,
     *,
     acceptance: Acceptance = "coin",
-    selection: Selection = "best",
     num_chains: int = NUM_CHAINS,
-) -> ThesisResult:
-    """Runs 16 chains of 75 steps from uniform starts and selects an answer.
+) -> Posterior:
+    """All states of 16 chains of 75 steps from uniform starts; of a coin's no posterior at all.
 
     Costs 16 x 76 = 1216 evaluations, whatever happens, where nothing else is asked for.
     `log_similarity`: `[dim] -> []` of the parameters themselves, each in (0, 1).
     """
     start_key, key = jax.random.split(key)
-    posterior = sample(
+    return sample(
         key,
         Thesis(acceptance=acceptance),
         log_similarity,
@@ -141,11 +128,10 @@ def infer(
         names,
         settings=Settings(warmup_steps=0, block_steps=25, max_steps=NUM_STEPS, stops_early=False),
     )
-    return ThesisResult(estimate=select(posterior, selection), posterior=posterior)
 
 
 def select(posterior: Posterior, selection: Selection) -> np.ndarray:
-    """The answer `[dim]` of the chains.
+    """The answer `[dim]` of the chains, in (0, 1); a point, without an interval.
 
     A better proposal is always kept, so the best state is also the best proposal.
     """
@@ -193,16 +179,15 @@ def thesis_posterior(
         velocity = jnp.diff(predicted, axis=-1) / dt
         return similarity_of(similarity, velocity, observed, jnp.asarray(both))
 
-    answer = infer(
+    chains = infer(
         jax.random.key(seed),
         log_similarity,
         SEARCHED,
         acceptance=acceptance,
-        selection=selection,
         num_chains=num_chains,
     )
-    draws = answer.posterior.draws
+    draws = chains.draws
     whole = np.tile(rest_theta, (*draws.shape[:2], 1))
     whole[..., where] = draws
-    posterior = replace(answer.posterior, names=trials.names, draws=whole)
-    return posterior, dict(zip(SEARCHED, map(float, answer.estimate), strict=True))
+    posterior = replace(chains, names=trials.names, draws=whole)
+    return posterior, dict(zip(SEARCHED, map(float, select(chains, selection)), strict=True))
