@@ -248,8 +248,6 @@ def test_what_the_best_formula_says():
     none = said("unknown", {"best_formula": None})
     assert none == "No short formula was found that could explain the missing force."
     assert said("named", None) == ""
-    old = {"objects": {"object1": {"formula": "a1 = 0.8 t"}}}
-    assert said("unknown", old) == "", "no longer believed"
 
 
 def test_how_to_go_on(trials):
