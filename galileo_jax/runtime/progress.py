@@ -13,7 +13,7 @@ do not see each other's. Without a scope all of these do nothing.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
@@ -47,32 +47,27 @@ class _Scope:
 _scope: ContextVar[_Scope | None] = ContextVar("galileo_jax_progress", default=None)
 
 
-@contextmanager
 def scope(
     on_progress: OnProgress | None = None, cancel: CancelFlag | None = None
-) -> Iterator[None]:
+) -> AbstractContextManager[None]:
     """Sends what is reported inside to `on_progress`; a call inside another's scope joins it."""
-    if on_progress is None and cancel is None:
-        yield
-        return
-    token = _scope.set(_Scope(on_progress, cancel))
-    try:
-        yield
-    finally:
-        _scope.reset(token)
+    is_joined = on_progress is None and cancel is None
+    return nullcontext() if is_joined else _inside(_Scope(on_progress, cancel))
 
 
-@contextmanager
-def part(start: float, end: float) -> Iterator[None]:
+def part(start: float, end: float) -> AbstractContextManager[None]:
     """What is reported inside, from 0 to 1, is this part of the work outside."""
     outer = _scope.get()
     if outer is None:
-        yield
-        return
+        return nullcontext()
     width = outer.end - outer.start
-    token = _scope.set(
-        replace(outer, start=outer.start + start * width, end=outer.start + end * width)
-    )
+    own = replace(outer, start=outer.start + start * width, end=outer.start + end * width)
+    return _inside(own)
+
+
+@contextmanager
+def _inside(scope: _Scope) -> Iterator[None]:
+    token = _scope.set(scope)
     try:
         yield
     finally:

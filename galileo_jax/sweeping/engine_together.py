@@ -14,21 +14,11 @@ from galileo_jax.sweeping.task import Outcome, Task, attempt
 
 
 class EngineTogether:
-    """Carries out tasks in threads of this process."""
+    """Carries out tasks in threads of this process, whose calls `group` makes together."""
 
     def __init__(self, num_together: int):
         self.num_together = num_together
-        self._group = Together()
-
-    @property
-    def num_calls(self) -> int:
-        """Of programs, that tasks have asked for."""
-        return self._group.num_calls
-
-    @property
-    def num_made(self) -> int:
-        """Of programs, that were made: one for many, where it goes well."""
-        return self._group.num_made
+        self.group = Together()
 
     def outcomes(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """See `Engine`."""
@@ -37,7 +27,7 @@ class EngineTogether:
 
         def work() -> None:
             try:
-                with self._group.member():
+                with self.group.member():
                     while True:
                         with lock:
                             task = next(waiting, None)
@@ -49,7 +39,7 @@ class EngineTogether:
             finally:
                 done.put(None)
 
-        self._group.expect(self.num_together)
+        self.group.expect(self.num_together)
         for _ in range(self.num_together):
             # Cancelling, and who is told of progress, belong to the context of the caller.
             run = contextvars.copy_context().run
@@ -67,4 +57,4 @@ class EngineTogether:
 
     def close(self) -> None:
         """Ends the tasks at their next call of a program."""
-        self._group.close()
+        self.group.close()

@@ -42,7 +42,7 @@ def test_fits_are_those_of_each_clip_alone(tracks):
             few = ONE_DRAW * entry["sd"]
             assert found[name]["mean"] == pytest.approx(entry["mean"], abs=few)
             assert found[name]["sd"] == pytest.approx(entry["sd"], abs=few)
-    assert engine.num_made < 0.7 * engine.num_calls
+    assert engine.group.num_made < 0.7 * engine.group.num_calls
 
 
 def test_more_tasks_than_threads_and_one_that_fails():
