@@ -1,7 +1,7 @@
 import os
 import subprocess
 import sys
-from importlib import metadata
+from importlib import import_module, metadata
 from pathlib import Path
 
 import pytest
@@ -50,6 +50,19 @@ def test_every_verb_shows_its_help(verb, capsys):
         __main__.main([verb, "--help"])
     assert stopped.value.code == 0
     assert "usage:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["fit", "next", "studio"])
+def test_every_verb_is_a_module(verb):
+    words = [sys.executable, "-m", f"galileo_jax.{verb}", "--help"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(f"usage: galileo {verb} ")
+
+
+def test_a_module_of_a_verb_is_its_function():
+    assert import_module("galileo_jax.fit") is galileo_jax.fit
+    with pytest.raises(ModuleNotFoundError):
+        import_module("galileo_jax.fti")
 
 
 @pytest.mark.parametrize("verb", ["", "fit", "compare", "diagnose", "predict"])
