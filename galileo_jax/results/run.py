@@ -61,7 +61,13 @@ class Run:
 
     @property
     def best(self) -> np.ndarray:
-        """`[parameter]`, the best fit in the parameters' units."""
+        """`[parameter]`, the best fit in the parameters' units.
+
+        Raises:
+          InputError: an earlier version wrote the run.
+        """
+        if BEST not in self.posterior.provenance:
+            raise InputError(f"{self.folder}: an earlier version wrote this run; fit the clip anew")
         return self.trials.theta(np.asarray(self.posterior.provenance[BEST]))
 
 
