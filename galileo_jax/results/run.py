@@ -109,8 +109,6 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     clip = load_clip(folder / CLIP)
     observation = with_errors(folder / ERRORS, read_observation_csv(folder / OBSERVATION))
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
-    if BEST not in posterior.provenance:
-        raise InputError(f"{folder / POSTERIOR}: an earlier version wrote it; fit the clip again")
     for path in result.get("effects_from", []):
         load_file(path)
     problem = make_problem(
