@@ -15,7 +15,7 @@ from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.result import make_result
 from galileo_jax.model.parameters import inverse
 from galileo_jax.observation.observation import Observation
-from galileo_jax.results.run import Run, save_run
+from galileo_jax.results.run import BEST, Run, save_run
 from tests.reference_ramp import Experiment, solve
 
 SIZES = ((0.06, 0.05), (0.07, 0.06))
@@ -74,6 +74,7 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
         draws=trials.theta(draws).reshape(2, NUM_DRAWS // 2, -1),
         log_density=-0.5 * np.sum(draws**2, axis=-1).reshape(2, -1),
         status=Status.CONVERGED,
+        provenance={BEST: np.median(draws, axis=0).tolist()},
     )
     result = make_result(
         trials,
