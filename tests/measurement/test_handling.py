@@ -1,10 +1,12 @@
 """What is in a hand at first: when a throw, a drop or a swing becomes free, and what stops it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from galileo_jax.measurement.segments.handling import let_go_frame, thrown_frame
+from galileo_jax.measurement.segments.handling import let_go_frame, pushed_frame, thrown_frame
 from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
@@ -122,3 +124,17 @@ def test_who_stops_it_ends_it_and_damping_does_not(fps: float) -> None:
     assert frame is not None
     assert -4 / fps - 0.01 < frame / fps - stopped_s <= 1e-9
     assert standstill_frame(swing(fps, damping=3.0)) is None
+
+
+def test_a_push_shows_between_two_rests() -> None:
+    """What rests is stated more exactly than it is marked: its scatter is no push."""
+    times, slows_m_s2, at_s = np.arange(100) / 30, 3.0, (1.1, 1.36)
+    push = np.clip(times - at_s[0], 0, at_s[1] - at_s[0])
+    free = np.clip(times - at_s[1], 0, 1.9 / slows_m_s2)
+    way = 1.9 / (at_s[1] - at_s[0]) * push**2 / 2 + 1.9 * free - slows_m_s2 * free**2 / 2
+    rests = (times < at_s[0]) | (free == free.max())
+    found = noisy(times, np.stack([way, 0 * way]), noise_m=2e-4)
+    smaller = np.where(rests, 0.02, 1.0)
+    found = replace(found, covariance_m2=found.covariance_m2 * smaller)
+    first = pushed_frame(found)
+    assert first is not None and at_s[1] < times[first] < at_s[1] + 0.2

@@ -89,16 +89,22 @@ def hand_frame(observation: Observation) -> int | None:
 def pushed_frame(observation: Observation) -> int | None:
     """The first frame after a push on a level table; None where nothing pushes it at first.
 
-    It gains speed, by `CLEAR` standard deviations of its acceleration in a window, within the first
-    half of its way only: what gains speed for longer is pulled by something of the scene.
+    It gains speed, by `CLEAR` standard deviations of its acceleration in a window and by `HELD` of
+    what friction slows it down by, within the first half of its way only: what gains speed for
+    longer is pulled by something of the scene.
     """
     path = observation.path()
     if len(path) < 4 * FEWEST:
         return None
     gone, length = _gone(path.place_m)
     size = _window(len(path))
-    found, sd = _accelerations(path, gone, np.arange(len(path) - size + 1), size)
-    gains = np.flatnonzero(found > CLEAR * sd)
+    starts = np.arange(len(path) - size + 1)
+    found, sd = _accelerations(path, gone, starts, size)
+    middle = gone[starts + size // 2] / length
+    on_way = (middle > WAY[0]) & (middle < WAY[1])
+    slows = -float(np.median(found[on_way])) if on_way.any() else 0.0
+    # What rests before the push and after the way scatters by less than what moves.
+    gains = np.flatnonzero(found > max(CLEAR * sd, HELD * slows))
     if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
         return None
     return int(path.frames[min(gains[-1] + size, len(path) - 1)])
