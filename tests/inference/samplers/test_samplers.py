@@ -30,7 +30,7 @@ MONTE_CARLO_ERRORS = 5.0  # about thirty comparisons in this file
 
 
 def tuned(name: str, mean, covariance) -> TunedSampler:
-    return SAMPLERS.get(name).from_gaussian(jnp.asarray(mean), jnp.asarray(covariance))
+    return SAMPLERS[name].from_gaussian(jnp.asarray(mean), jnp.asarray(covariance))
 
 
 def run(name: str, target: Target, seed: int = 0, **settings):
