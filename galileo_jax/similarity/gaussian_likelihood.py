@@ -22,7 +22,7 @@ from galileo_jax.similarity.level_discrepancy import level_modes
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
 FEW_VALUES = 400  # of so many a singular value decomposition takes a tenth of a second
-LARGE = 6e4  # of patterns: its square times 2e-16 is a millionth
+LARGE = 6e5  # of patterns: its square times 2e-16 is a ten-thousandth
 IDLE = 1e-3  # a gain that changes a residual by less than a millionth
 Places = Float[jax.Array, "object axis frame"]
 Scale = Float[jax.Array, ""] | float
@@ -211,14 +211,16 @@ def principal_modes(
     """The singular values and right singular vectors of patterns.
 
     Of more patterns than values, where these are many, from the eigenvalues of their covariance,
-    which takes a quarter of the time; rounding adds less than a millionth of the tracker's
+    which takes a quarter of the time; rounding adds less than a ten-thousandth of the tracker's
     variance to it. Where patterns are so large that it would add more, and of few values, by a
     singular value decomposition, which loses nothing.
     """
     num_patterns, num_values = patterns.shape
     is_long = num_patterns > num_values > FEW_VALUES
-    if is_long and np.linalg.norm(patterns) < LARGE:
+    size = float(np.linalg.norm(patterns))
+    if is_long and size < LARGE:
         variance, basis = np.linalg.eigh(patterns.T @ patterns)
-        return np.sqrt(np.maximum(variance[::-1], 0.0)), basis.T[::-1]
+        variance[variance < np.finfo(float).eps * size**2] = 0.0  # rounding
+        return np.sqrt(variance[::-1]), basis.T[::-1]
     _, gain, basis = np.linalg.svd(patterns, full_matrices=False)
     return gain, basis
