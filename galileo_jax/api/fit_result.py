@@ -29,6 +29,7 @@ from galileo_jax.results.run import (
     POSTERIOR,
     RESULT,
     Run,
+    best_z,
     read_result,
     save_run,
 )
@@ -160,7 +161,7 @@ class Fit:
     @property
     def z_best(self) -> np.ndarray:
         """`[parameter]`, the best fit, in the search space."""
-        return np.array(self.posterior.provenance[BEST])
+        return best_z(self.posterior, self.folder)
 
     def runs(self, folder: Path) -> tuple[Run, ...]:
         """The fit of every clip, as `save` leaves it in `folder` and below."""

@@ -21,13 +21,7 @@ LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
 # Of a scale that is a thing's length in the picture, whose ends are where its texture seems to
 # end: as much as the scale's key allows, a fifth, once it is rounded.
 SIZE_SD_SHARE = 0.19
-OPTIONS = {
-    "scenario": "--scenario",
-    "ramp_angle_deg": "--ramp-angle",
-    "pixels_per_metre": "--pixels-per-metre",
-    "track_units": "--track-units",
-    "fps": "--fps",
-}
+GIVEN = ("scenario", "ramp_angle_deg", "pixels_per_metre", "track_units", "fps")
 NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
 
 
@@ -121,11 +115,17 @@ def check_answered(known: Understood, answers: Answers) -> None:
 
 def _given(answers: Answers) -> Iterator[str]:
     """What was said already, as options of a call."""
-    for key, option in OPTIONS.items():
-        if (value := answers.get(key)) is not None:
-            yield f"{option} {value:g}" if isinstance(value, float | int) else f"{option} {value}"
+    for key in GIVEN:
+        if answers.get(key) is not None:
+            yield _option(key, answers[key])
     for x, y in answers.get("points") or ():
         yield f"--point {x:g} {y:g}"
+
+
+def _option(key: str, value: Any) -> str:
+    """An answer by the yaml's key as an option of a call."""
+    shown = f"{value:g}" if isinstance(value, float) else value
+    return f"--{key.removesuffix('_deg').replace('_', '-')} {shown}"
 
 
 def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def _scenario(known: Understood, answers: Answers) -> Question | None:
         return None
     name = likely.scenario if likely else None
     why = f"perhaps {name}: {likely.why}" if likely else "the motion could not be followed"
-    example = f"--scenario {name or 'ramp'}"
+    example = _option("scenario", name or "ramp")
     text = "What kind of motion is it?"
     return Question("scenario", text, why, example, name, tuple(SCENARIOS))
 
@@ -182,7 +182,7 @@ def _fps(known: Understood) -> Question | None:
     if seen is None or not seen.is_in_frames or (table is not None and table.frame_s is not None):
         return None
     text = "How many frames per second does the camera take?"
-    return Question("fps", text, "the table counts frames and has no times", "--fps 30")
+    return Question("fps", text, "the table counts frames and has no times", _option("fps", 30))
 
 
 def _units(known: Understood, answers: Answers) -> Question | None:
@@ -197,7 +197,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
     if is_open := unit is None:
         unit = "px" if size >= 50 else "m" if size <= 20 else "cm"
         why = f"the table does not say; the way is {size:.4g} long"
-    option = f"--track-units {unit}"
+    option = _option("track_units", unit)
     return Question("track_units", text, why, option, unit, choices, is_open)
 
 
@@ -226,14 +226,14 @@ def _angle(known: Understood, answers: Answers) -> Question | None:
     text = "What is the ramp's angle to the horizontal, in degrees, as measured?"
     likely = known.likely(answers)
     told = likely.slope_deg if likely is not None else None
-    option, default = "--ramp-angle 20", "path"
+    option, default = _option("ramp_angle_deg", 20), "path"
     if known.is_film and told is None and (known.is_pair or known.foot is not None):
         why = "else it is taken from the path in the picture"
     elif told is None or likely is None or not likely.is_clear:
         why, default = "friction cannot be told from slope without it", None
     else:
         why = f"else it is taken from the path, which lies at {told:.1f} degrees"
-        option = f"--ramp-angle {told:.0f}"
+        option = _option("ramp_angle_deg", round(told))
     return Question("ramp_angle_deg", text, why, option, default, (), default is None)
 
 
@@ -257,7 +257,7 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
             "; the pixels of a length that you know, divided by its metres; galileo look "
             f"{shlex.quote(str(known.source))} --plot first.png draws a ruler"
         )
-    return Question("pixels_per_metre", text, why, "--pixels-per-metre 900")
+    return Question("pixels_per_metre", text, why, _option("pixels_per_metre", 900))
 
 
 def _length_px(known: Understood, answers: Answers) -> float | None:

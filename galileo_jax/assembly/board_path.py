@@ -12,6 +12,7 @@ from numpy.polynomial import legendre
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.effects.nuisances.board_shape import LENGTH, MOST, BoardShape
+from galileo_jax.numerics.least_squares import line_through
 from galileo_jax.observation.observation import Observation
 
 LEAST_BEND_M, LEAST_BEND_SHARE = 0.0015, 0.004
@@ -30,11 +31,7 @@ def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, 
         return {}
     place = observation.position_m[0][:, seen]
     variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
-    gone = place - place[:, :1]
-    middle = gone.mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh((gone - middle) @ (gone - middle).T)
-    furthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
-    along = axes[:, 1] * math.copysign(1.0, axes[:, 1] @ furthest)
+    gone, along = place - place[:, :1], line_through(place).along
     down = np.array([along[1], -along[0]]) * math.copysign(1.0, along[0])
     way, drop = along @ gone, down @ gone
     length = float(way.max())

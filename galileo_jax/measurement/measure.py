@@ -139,6 +139,7 @@ def measure(clip: Clip) -> Measurement:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
         clip = _inclined(clip, observed(_without_sizes(clip))[0])
     whole, pixels = observed(clip)
+    tracked = whole
     if needs_slope:
         clip = _inclined(clip, whole, told)
     else:
@@ -169,20 +170,20 @@ def measure(clip: Clip) -> Measurement:
     overlay = f"see the overlay: galileo track {clip.source or clip.path}"
     doubts += [] if doubt is None else [doubt]
     doubts += [f"{clip.path}: {one}: {one.why}; {overlay}" for one in segments.astray]
-    of_scene = _of_scene(clip, whole, segments, pixels)
+    of_scene = _of_scene(clip, tracked, segments, pixels)
     return Measurement(
         clip, observation, whole, pixels, told.inferred, segments, tuple(doubts),
         tuple(told.remarks), way, frames_used, len(whole.times_s), of_scene,
     )  # fmt: skip
 
 
-def _of_scene(clip: Clip, whole: Observation, segments: Segments, pixels: Track | None) -> int:
+def _of_scene(clip: Clip, tracked: Observation, segments: Segments, pixels: Track | None) -> int:
     """How many frames show what is modelled."""
-    is_there = segments.within(whole.times_s)
+    is_there = segments.within(tracked.times_s)
     is_there[: min(item.first_frame or 0 for item in clip.objects)] = False
     if pixels is not None:
         is_there[_left_picture(pixels) :] = False
-        is_there &= whole.mask.any(axis=0) | ~pixels.is_visible.any(axis=0)  # not in a long rest
+        is_there &= tracked.mask.any(axis=0) | ~pixels.is_visible.any(axis=0)  # not in a long rest
     return int(is_there.sum())
 
 

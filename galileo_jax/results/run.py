@@ -61,14 +61,19 @@ class Run:
 
     @property
     def best(self) -> np.ndarray:
-        """`[parameter]`, the best fit in the parameters' units.
+        """`[parameter]`, the best fit in the parameters' units; raises as `best_z`."""
+        return self.trials.theta(best_z(self.posterior, self.folder))
 
-        Raises:
-          InputError: an earlier version wrote the run.
-        """
-        if BEST not in self.posterior.provenance:
-            raise InputError(f"{self.folder}: an earlier version wrote this run; fit the clip anew")
-        return self.trials.theta(np.asarray(self.posterior.provenance[BEST]))
+
+def best_z(posterior: Posterior, folder: Path | None) -> np.ndarray:
+    """`[parameter]`, the best fit in the search space.
+
+    Raises:
+      InputError: an earlier version wrote the run.
+    """
+    if BEST not in posterior.provenance:
+        raise InputError(f"{folder}: an earlier version wrote this run; fit the clip anew")
+    return np.array(posterior.provenance[BEST])
 
 
 def save_run(

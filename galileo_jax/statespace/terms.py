@@ -145,7 +145,13 @@ def lasting_error(seen: Seen) -> Patterns:
     return _smooth(seen, LASTS * float(np.ptp(seen.observation.times_s)))
 
 
-@_term("times are off by {size} at random", "s", lambda seen: 0.01 * _frame_s(seen), 4.0, True)
+@_term(
+    "times are off by {size} at random",
+    "s",
+    lambda seen: 0.01 * _frame_s(seen),
+    4.0,
+    is_of_marks=True,
+)
 def late_times(seen: Seen) -> Patterns:
     """Times off at random, of each frame by another amount, which shifts bodies by v dt.
 

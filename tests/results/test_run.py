@@ -8,6 +8,9 @@ import pytest
 
 from galileo_jax.assembly.build_problem import noise_of
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.runtime.errors import InputError
+from tests.oracle_run import HIT as HIT_RUN
+from tests.oracle_run import make_run
 from tests.ramp_model import HIT, make_surroundings
 
 SCENE = make_surroundings(HIT)
@@ -35,3 +38,11 @@ FALL = replace(SCENE, has_surface=False, angle_rad=radians(90))
 )
 def test_metres_without_pixels_were_seen_by_no_camera(change, scene, noise):
     assert noise_of(TRACK.model_copy(update=change), scene) == noise
+
+
+def test_a_run_of_an_earlier_version_is_refused_where_its_best_fit_is_asked_for(tmp_path):
+    run = make_run(tmp_path, HIT_RUN, 1.0)
+    assert run.best.shape == (len(run.posterior.names),)
+    old = replace(run, posterior=replace(run.posterior, provenance={}))
+    with pytest.raises(InputError, match=r"run: an earlier version wrote this run; fit"):
+        _ = old.best
