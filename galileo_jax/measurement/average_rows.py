@@ -16,15 +16,15 @@ from jaxtyping import Float
 
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
-MOST_ROWS = 500
+MOST_VALUES = 1000  # coordinates that a fit compares: what it costs grows with their square
 FEWEST, MOST_TERMS = 4, 6  # rows, and terms of p: no more than half of its rows and one
 CLEAR = 4.0  # sds by which chi2 may be beyond what is expected
 
 
 def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]]:
-    """The observation with about `MOST_ROWS` rows, and a line that says so; as it is, if fewer."""
+    """The observation with about `MOST_VALUES` values, and a line that says so; if fewer, as is."""
     seen = int(observation.mask.any(axis=0).sum())
-    size = math.ceil(seen / MOST_ROWS)
+    size = math.ceil(int(observation.mask.sum()) * observation.position_m.shape[1] / MOST_VALUES)
     if size < 2:
         return observation, []
     weights, kept = _weights(observation, size)
@@ -95,11 +95,25 @@ def _of_group(observation: Observation, group: slice, around: slice) -> np.ndarr
     if not is_seen.any():
         return weights
     place = observation.position_m[is_seen][..., around]
-    left = place - place @ fit.T @ powers.T
-    covariance = np.moveaxis(observation.covariance_m2[is_seen][..., around], -1, 1)
-    white = np.linalg.solve(covariance, np.moveaxis(left, -1, 1)[..., None])[..., 0]
-    chi2 = np.einsum("oat,ota->", left, white)
+    left = (place - place @ fit.T @ powers.T).ravel()
+    chi2 = left @ np.linalg.solve(_errors_m2(observation, is_seen, around), left)
     num_lines = (observation.across[is_seen][..., around] != 0).any(axis=(1, 2)).sum()
-    degrees = (left.shape[0] * left.shape[1] - num_lines) * (len(times) - terms)
+    degrees = (place.shape[0] * place.shape[1] - num_lines) * (len(times) - terms)
     is_smooth = chi2 < degrees + CLEAR * math.sqrt(2 * degrees)
     return weights if is_smooth else None
+
+
+def _errors_m2(
+    observation: Observation, is_seen: np.ndarray, around: slice
+) -> Float[np.ndarray, "value value"]:
+    """The covariance of all errors of the frames `around`: own ones, and those that they share."""
+    own = observation.covariance_m2[is_seen][..., around]
+    objects, axes, _, frames = own.shape
+    whole = np.zeros((objects, axes, frames, objects, axes, frames))
+    one, frame = np.arange(objects)[:, None], np.arange(frames)
+    whole[one, :, frame, one, :, frame] = np.moveaxis(own, -1, 1)
+    whole = whole.reshape(2 * (objects * axes * frames,))
+    if observation.modes_m is None:
+        return whole
+    modes = observation.modes_m[:, is_seen][..., around].reshape(-1, len(whole))
+    return whole + modes.T @ modes

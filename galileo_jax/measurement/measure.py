@@ -163,9 +163,8 @@ def measure(clip: Clip) -> Measurement:
         # that is told by the track would take for it.
         observation = with_wander(observation, clip.objects, clip.walls)
     frames_used = int(observation.mask.any(axis=0).sum())
-    if not observation.is_tracked_here:
-        observation, said = with_rows_averaged(observation)
-        told.say(*said)
+    observation, said = with_rows_averaged(observation)
+    told.say(*said)
     doubts = [] if way is None else [f"{clip.path}: {way_text(clip, way)}"]
     overlay = f"see the overlay: galileo track {clip.source or clip.path}"
     doubts += [] if doubt is None else [doubt]

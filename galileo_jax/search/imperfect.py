@@ -60,7 +60,7 @@ def fit_worlds(
     fitter = GradientFitter(trials)
 
     def is_enough(fit: GradientFit) -> bool:
-        return fitter.is_explained(fit) or is_usual(with_imperfections(trials, fit))
+        return fitter.is_explained(fit) or is_usual(with_imperfections(trials, fit, to_rest=False))
 
     exact = World(trials, best_fit(fitter, seed, on_stage, is_enough=is_enough))
     on_stage("sizing imperfections")
@@ -108,14 +108,15 @@ def with_imperfections(
     if not terms or fit.code is Code.FAILED:
         return World(trials, fit)
     starts, known = x, np.full(len(terms), np.inf)
-    for _ in range(MOST_ROUNDS):
+    for i in range(MOST_ROUNDS):
         modes = most_probable(linear_clips(trials, fit), terms, starts, fit)
-        moved, known = np.abs(modes[0].x - known).max(), modes[0].x
+        is_last = np.abs(modes[0].x - known).max() < SETTLED or i == MOST_ROUNDS - 1
+        known = modes[0].x
         starts = [mode.x for mode in modes]
         by_name = dict(zip((term.name for term in terms), modes[0].x.tolist(), strict=True))
         trials = trials.with_sizes(by_name)
-        fit = GradientFitter(trials).continued(fit, to_rest)
-        if moved < SETTLED or fit.code is Code.FAILED:
+        fit = GradientFitter(trials).continued(fit, to_rest and is_last)
+        if is_last or fit.code is Code.FAILED:
             break
     sizes = integrated(linear_clips(trials, fit), terms, modes)
     more = sizes.log_evidence

@@ -195,6 +195,10 @@ class Table:
         is_chance = self.entries[BASE].num_agreeing < LEAST_AGREEING and self.num_rounds == 1
         return is_chance or not self.is_explained(self.base)
 
+    def has_asked(self, move: str) -> bool:
+        """Whether a move has proposed anything."""
+        return any(name == move for name, *_ in self.asked)
+
     def not_asked(
         self, move: str, wanted: Sequence[tuple[Hypothesis, tuple[str, ...]]]
     ) -> list[tuple[Hypothesis, tuple[str, ...]]]:

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.average_rows import MOST_ROWS, with_rows_averaged
+from galileo_jax.measurement.average_rows import MOST_VALUES, with_rows_averaged
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from tests.measurement.seen import seen
 
 SD_M = 5e-4
+MOST_ROWS = MOST_VALUES // 2  # of one object in two axes
 
 
 def went(way_m: np.ndarray, times_s: np.ndarray) -> Observation:
@@ -91,6 +92,36 @@ def test_shared_errors_are_averaged_alike():
     averaged, _ = with_rows_averaged(replace(went(swing(times), times), modes_m=drift))
     assert averaged.modes_m is not None
     assert averaged.modes_m[0, 0, 0] == pytest.approx(averaged.times_s / times[-1])
+
+
+def test_scatter_that_is_a_shared_error_keeps_no_row_from_its_mean():
+    """As in a film at rest, whose frames are known far better than what they share wanders."""
+    rng, times = np.random.default_rng(0), np.arange(1000) / 120
+    wander = 20 * SD_M * rng.standard_normal(1000)
+    modes = np.zeros((1000, 1, 2, 1000))
+    modes[np.arange(1000), 0, 0, np.arange(1000)] = 20 * SD_M
+    whole = went(0.3 * times, times)
+    shaken = replace(whole, position_m=whole.position_m + wander * np.array([[1.0], [0.0]]))
+    assert len(with_rows_averaged(shaken)[0].times_s) > 900
+    averaged, _ = with_rows_averaged(replace(shaken, modes_m=modes))
+    assert len(averaged.times_s) < 1.2 * MOST_ROWS
+    assert averaged.modes_m is not None
+    shared = np.einsum("mt,mt->t", averaged.modes_m[:, 0, 0], averaged.modes_m[:, 0, 0])
+    error = averaged.position_m[0, 0] - 0.3 * averaged.times_s
+    assert np.mean(error**2 / (shared + averaged.covariance_m2[0, 0, 0])) == pytest.approx(1, abs=0.2)
+
+
+def test_two_objects_have_half_the_rows_of_one():
+    times = np.arange(MOST_ROWS) / 120
+    one = went(0.3 * times, times)
+    both = replace(
+        one,
+        names=("object1", "object2"),
+        position_m=np.concatenate([one.position_m, one.position_m]),
+        covariance_m2=np.concatenate([one.covariance_m2, one.covariance_m2]),
+        mask=np.concatenate([one.mask, one.mask]),
+    )
+    assert len(with_rows_averaged(both)[0].times_s) < 0.6 * MOST_ROWS
 
 
 def test_a_short_track_stays_as_it_is():

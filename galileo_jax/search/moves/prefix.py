@@ -32,12 +32,11 @@ LEAST_FRAMES = 4  # before it moves: from fewer nothing is fitted
 
 
 def propose(table: Table) -> list[Start]:
-    """Starts of a fit without rivals that is in doubt."""
-    if not table.is_in_doubt:
+    """Starts of a fit without rivals that is in doubt; once, for they are of no other fit."""
+    if not table.is_in_doubt or table.has_asked(NAME):
         return []
     return [
-        Start((), z, parent, NAME, number % NUM_FOLLOWED)
-        for parent, _ in table.not_asked(NAME, [(table.base, ())])
+        Start((), z, table.base, NAME, number % NUM_FOLLOWED)
         for number, z in enumerate(by_phases(table))
     ]
 
