@@ -56,8 +56,17 @@ class Fit:
 class Target:
     """A smoothed template with its gradients: what pictures are aligned with."""
 
-    def __init__(self, image: np.ndarray, region: np.ndarray, width_px: float):
-        """`image` and `region` (bool) are `[size, size]`; `width_px` the smoothing."""
+    def __init__(
+        self,
+        image: np.ndarray,
+        region: np.ndarray,
+        width_px: float,
+        shows_turns: bool | None = None,
+    ):
+        """`image` and `region` (bool) are `[size, size]`; `width_px` the smoothing.
+
+        `shows_turns`: of the object, where that is known; a smear hides turns only in part.
+        """
         self.width_px = width_px
         self.radius = (image.shape[0] - 1) // 2
         self.region = region
@@ -77,7 +86,7 @@ class Target:
         self.jacobian = np.stack(rows)
         self.normal = self.jacobian @ self.jacobian.T
 
-        self.shows_turns = self._shows_turns()
+        self.shows_turns = self._shows_turns() if shows_turns is None else shows_turns
         # Holds the angle fast where it cannot be told, and the shape nearly so; otherwise only
         # against 0 / 0.
         turn, stretch = 1e-9 if self.shows_turns else 1e12, (ALIKE_GREY / STRETCH_SD) ** 2

@@ -76,7 +76,7 @@ class Template:
         least, region = MIN_REGION_SHARE * self.region.mean(), share >= ALWAYS
         if region.mean() < least:
             region = share >= np.quantile(share, 1 - least)
-        return Target(smeared, region, width_px)
+        return Target(smeared, region, width_px, self.shows_turns)
 
     def sharp(self, width_px: float) -> Target:
         """What a patch looks like that does not move."""

@@ -18,6 +18,7 @@ Source: Gilmour, Thompson and Cullis (1995), Average information REML, Biometric
 importance sampling, J. Am. Stat. Assoc. 95, 135.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -74,11 +75,17 @@ class LinearClip:
         self, terms: Sequence[Term], x: np.ndarray, log_scale: float
     ) -> Float[np.ndarray, "value value"]:
         """C; `x` `[term]`, `log_scale` the noise scale's, in units of its prior's width."""
-        found = self.fixed + np.exp(2 * NOISE_SD * log_scale) * np.eye(len(self.e))
-        for term, own in zip(terms, x, strict=True):
-            if term.name in self.of_terms:
-                found += term.factor ** (2 * own) * self.of_terms[term.name]
+        size2 = {term.name: term.factor ** (2 * own) for term, own in zip(terms, x, strict=True)}
+        found = self.fixed.copy()
+        if self.of_terms:
+            found += np.tensordot([size2.get(name, 0.0) for name in self.of_terms], self._every, 1)
+        found[np.diag_indices_from(found)] += np.exp(2 * NOISE_SD * log_scale)
         return found
+
+    @functools.cached_property
+    def _every(self) -> Float[np.ndarray, "term value value"]:
+        """All of `of_terms`."""
+        return np.stack(list(self.of_terms.values()))
 
 
 class Mode(NamedTuple):
