@@ -5,7 +5,6 @@ but its still pictures need Chrome; Matplotlib's SVG needs nothing. Both follow 
 have Plotly's figures as plain JSON (`plotly_figure.py`).
 """
 
-import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +25,7 @@ from galileo_jax.report.chart import (
     layout_of,
 )
 from galileo_jax.report.plotly_figure import figure
-from galileo_jax.report.style import matplotlib_style, palette
+from galileo_jax.report.style import matplotlib_style, palette, save_svg
 from galileo_jax.runtime.atomic_write import replacing, write_text
 
 if TYPE_CHECKING:
@@ -50,10 +49,8 @@ def to_plotly(chart: Chart) -> "go.Figure":
 
 def to_svg(chart: Chart) -> str:
     """The chart as an SVG document; the same text for the same chart."""
-    stream = io.StringIO()
     with matplotlib_style(chart.name):
-        _drawn(chart).savefig(stream, format="svg", metadata={"Date": None})
-    return stream.getvalue()
+        return save_svg(_drawn(chart), chart.name)
 
 
 def write_svgs(folder: Path, charts: Iterable[Chart]) -> list[Path]:

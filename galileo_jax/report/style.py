@@ -3,12 +3,16 @@
 `page.css` defines the colours once; everything else reads them from there.
 """
 
+import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 OBJECTS = ("object1", "object2", "object3")
 
@@ -54,3 +58,11 @@ def matplotlib_style(name: str) -> Iterator[None]:
     }
     with matplotlib.rc_context(style):  # pyright: ignore
         yield
+
+
+def save_svg(figure: "Figure", name: str) -> str:
+    """The figure as an SVG document, the same text for the same figure."""
+    stream = io.StringIO()
+    with matplotlib_style(name):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return stream.getvalue()
