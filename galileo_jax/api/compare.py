@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ class Comparison:
         `clip, object, axis, phase, rmse, noise` (m/s), `z` (standard deviations of what the model
         itself would give) and `whiteness` (correlation of neighbouring residuals).
         """
-        return pd.DataFrame([asdict(place) for place in self.found.where])
+        return pd.DataFrame(self.document["where"])
 
     @in_float64
     def plot(self) -> "go.Figure":
@@ -85,13 +85,12 @@ class Comparison:
         write_comparison_page(
             Path(path),
             ", ".join(self.fit.names),
-            self.found,
-            self.fit.problem,
-            self.gradient,
+            self.document,
+            self.paths,
             [one.clip for one in self.fit.measurements],
-            self.fit.problem.all_effects,
+            (self.fit.problem, self.fit.problem.theta(self.gradient.z, self.gradient.free)),
+            is_adequate=self.is_adequate,
             command=self.command,
-            seed=self._seed,
         )
         return Path(path)
 
@@ -106,11 +105,8 @@ class Comparison:
     @in_float64
     def paths(self) -> tuple[PathResiduals, ...]:
         """Of every object: motion along its path, residuals, and the stretch where it fails."""
-        return path_residuals(self.fit.problem, self.gradient, self.found, self._seed)
-
-    @property
-    def _seed(self) -> int:
-        return int(self.document["seed"])
+        seed = int(self.document["seed"])
+        return path_residuals(self.fit.problem, self.gradient, self.found, seed)
 
     def __repr__(self) -> str:
         said = "adequate" if self.is_adequate else "not adequate"

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from html import escape
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.assembly.build_problem import make_joint_problem
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Verdicts
@@ -25,7 +27,7 @@ from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.experiment.choose import with_next
 from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.fit_posterior import fit_posterior
-from galileo_jax.inference.fits.gradient import Code, GradientFitter
+from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
@@ -34,8 +36,8 @@ from galileo_jax.observation.digest import digest
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.diagnosis_charts import diagnosis_chart
-from galileo_jax.report.diagnosis_page import write_diagnosis_page
-from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.diagnosis_page import before_after_charts, write_diagnosis_page
+from galileo_jax.report.draw import to_plotly, write_svgs
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS
 from galileo_jax.results.truth import hidden_effect
@@ -94,7 +96,7 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        return diagnosis_text.verdict(self.found)
+        return str(self.document["sentence"])
 
     @property
     def candidates(self) -> "pd.DataFrame":
@@ -191,6 +193,22 @@ class Diagnosis:
             effects_from=self.effects_from,
         )
 
+    @cached_property
+    @in_float64
+    def paths(self) -> tuple[tuple[PathResiduals, ...], ...]:
+        """Of every round and object: motion along its path, and residuals."""
+        seed = int(self.document["seed"])
+        return tuple(
+            path_residuals(*both, one.comparison, seed)
+            for both, one in zip(self._fits, self.found.rounds, strict=True)
+        )
+
+    @property
+    def _fits(self) -> list[tuple[JointProblem, GradientFit]]:
+        """Of every round."""
+        hypotheses = [one.hypothesis for one in self.found.rounds]
+        return [(one.of(self.problem), one.fit) for one in hypotheses]
+
     def next_command(self, folder: str | Path = ".") -> str:
         """The command that comes next; `folder`: where the diagnosis is saved."""
         clips = list(self.document["clips"])
@@ -199,7 +217,7 @@ class Diagnosis:
     @in_float64
     def plot(self) -> "go.Figure":
         """The error over the rounds, and the candidates' probabilities."""
-        return to_plotly(diagnosis_chart(self.found))
+        return to_plotly(diagnosis_chart(self.document))
 
     @in_float64
     def report(self, path: str | Path) -> Path:
@@ -208,14 +226,13 @@ class Diagnosis:
         write_diagnosis_page(
             Path(path),
             ", ".join(one.name for one in self.measurements),
-            self.problem,
-            self.found,
             self.document,
+            self.paths,
             clips,
+            [(trials, trials.theta(fit.z, fit.free)) for trials, fit in self._fits],
             truth=hidden_effect(clips[0].path),
             command=self.command,
             next_command=self.next_command(Path(path).parent),
-            seed=int(self.document["seed"]),
         )
         return Path(path)
 
@@ -245,11 +262,8 @@ class Diagnosis:
         write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
         if svg:
-            from galileo_jax.report.diagnosis_page import before_after_charts
-            from galileo_jax.report.draw import write_svgs
-
-            seed = int(self.document["seed"])
-            write_svgs(folder / PLOTS, before_after_charts(self.problem, self.found, seed))
+            charts = before_after_charts(self.document, self.paths).values()
+            write_svgs(folder / PLOTS, chain.from_iterable(charts))
         best.save(folder / "model", report=False)
         return folder
 

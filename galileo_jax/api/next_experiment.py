@@ -21,7 +21,7 @@ from galileo_jax.experiment.choose import (
     sentence_of,
 )
 from galileo_jax.experiment.hypothesis_probabilities import FILE, Beliefs, beliefs_of, read_beliefs
-from galileo_jax.experiment.settings import check_can, grid, parse_can
+from galileo_jax.experiment.settings import NUMBERS, check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import effect_names, load_file
 from galileo_jax.report.draw import to_plotly
@@ -33,7 +33,6 @@ from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 
 Found = Diagnosis | str | Path
-COLUMNS = ("gain_nats", "named", "lead_nats", "hit")
 DIAGNOSED = 0.8  # share of the work where runs are to be diagnosed together first
 
 
@@ -172,7 +171,7 @@ def make_next(
     ordered = best_first(rows)
     shares = zip(beliefs.of, beliefs.probability, strict=True)
     hypotheses = {one.name: float(p) for one, p in shares}
-    settings = [{**one.setting, **{key: getattr(one, key) for key in COLUMNS}} for one in ordered]
+    settings = [{**one.setting, **{key: getattr(one, key) for key in NUMBERS}} for one in ordered]
     document = {
         "about": about,
         "hypotheses": hypotheses,

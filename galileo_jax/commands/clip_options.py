@@ -73,7 +73,7 @@ def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
 def fit_table(found: "Fit", truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
-    from galileo_jax.report.fit_text import chi2_text, fit_quality
+    from galileo_jax.report.fit_text import error_text, fit_quality
     from galileo_jax.results.shown import shown, shown_parameters, unit_text
 
     result: Mapping[str, Any] = found.result
@@ -90,9 +90,5 @@ def fit_table(found: "Fit", truth: Mapping[str, float]) -> str:
         elif not entry["identified"]:
             known = f"   not determined by this clip: anything in {interval}"
         lines.append(f"{name:<18}{true:>10}{known}")
-    error = result["error"]
-    lines.append(
-        f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
-        f"{error['noise']:.4f}); {result['status']}"
-    )
+    lines.append(f"{error_text(result['error'])}; {result['status']}")
     return "\n".join([*lines, *fit_quality(result)])

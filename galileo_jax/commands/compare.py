@@ -1,7 +1,6 @@
 """`galileo compare`: is the model adequate for a clip, and where does it fail?"""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import galileo_jax as gx
@@ -37,25 +36,25 @@ def main(argv: Sequence[str]) -> None:
 
 def _lines(compared: "gx.Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
-    from galileo_jax.comparison.compare import pulled
-    from galileo_jax.report import diagnosis_text
+    from galileo_jax.report.diagnosis_text import adequacy
     from galileo_jax.report.fit_text import pull_text
 
-    names, found = compared.fit.names, compared.found
+    names, record = compared.fit.names, compared.document
     several = len(names) > 1
     width = max(len(name) for name in names) + 2 if several else 0
     lines = [
-        diagnosis_text.adequacy(found, compared.fit.problem.all_effects),
+        adequacy(record),
         "",
         f"{'clip' if several else '':<{width}}{'object':<10}{'axis':<6}{'phase':<11}"
         f"{'rmse':>8}{'noise':>8} m/s{'z':>7}",
     ]
-    for place in found.where[:NUM_CELLS]:
+    for place in record["where"][:NUM_CELLS]:
+        clip = place["clip"] if several else ""
         lines.append(
-            f"{place.clip if several else '':<{width}}{place.object:<10}{place.axis:<6}"
-            f"{place.phase:<11}{place.rmse:>8.4f}{place.noise:>8.4f}{place.z:>11.1f}"
+            "{clip:<{width}}{object:<10}{axis:<6}{phase:<11}{rmse:>8.4f}{noise:>8.4f}"
+            "{z:>11.1f}".format(**place | {"clip": clip, "width": width})
         )
-    return lines + [pull_text(asdict(pull)) for pull in pulled(found)]
+    return [*lines, *map(pull_text, record["pulls"])]
 
 
 def _parser() -> VerbParser:
@@ -67,6 +66,6 @@ def _parser() -> VerbParser:
     )
     what = "video, its yaml, a csv track, or a run"
     parser.add("fit", nargs="+", metavar="CLIP|RUN", help=what)
-    parser.add("effects", metavar="A,B", help="effects in the model (default: none)")
+    parser.add("effects")
     clip_options.add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
     return parser

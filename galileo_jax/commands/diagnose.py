@@ -69,36 +69,36 @@ def _lines(found: "gx.Diagnosis", hidden: str | None, out: Path) -> list[str]:
     from galileo_jax.inference.fits.gradient import BEHIND, SETTLED
     from galileo_jax.report import diagnosis_text
 
-    diagnosis, record = found.found, found.document
-    shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
-    width = max([NAME_WIDTH, *(len(entry["effect"]) + 2 for _, entry in shown)])
+    record = found.document
+    shown = record["candidates"][:NUM_CANDIDATES]
+    width = max([NAME_WIDTH, *(len(entry["effect"]) + 2 for entry in shown)])
     lines = ["", f"{'candidates':<{width}}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
-    for made, entry in shown:
-        strengths = diagnosis_text.strength_texts(made.effects, entry).values()
-        is_behind = diagnosis.candidates[0].log_evidence - made.log_evidence > BEHIND
+    for entry, made in zip(shown, found.found.candidates, strict=False):
+        strengths = diagnosis_text.strength_texts(entry).values()
+        is_behind = shown[0]["log_evidence"] - entry["log_evidence"] > BEHIND
         is_settled = made.hypothesis.fit.code in SETTLED
-        evidence = "far behind" if is_behind and not is_settled else f"{made.log_evidence:+.1f}"
+        evidence = f"{entry['log_evidence']:+.1f}"
+        evidence = "far behind" if is_behind and not is_settled else evidence
         lines.append(
             f"{entry['effect']:<{width}}{entry['probability']:>12.3f}{evidence:>12}"
             f"{diagnosis_text.p_text(entry['p_value']):>9}  "
             + (entry["law"] or ", ".join(strengths))
         )
-    p_none = diagnosis_text.p_text(diagnosis.base.p_value)
+    p_none = diagnosis_text.p_text(record["p_value"])
     lines.append(f"{'none':<{width}}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")
     lines = [*(lines if shown else []), "", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
-    lines += [f"why: {sentence}" for sentence in diagnosis_text.why(found.verdict.reasons)]
-    if found.verdict.status == "unknown":
+    lines += [f"why: {sentence}" for sentence in diagnosis_text.why(record["reasons"])]
+    if record["verdict"]["status"] == "unknown":
         lines.append(diagnosis_text.formula_text(record))
-    if "each_clip" in record:
-        lines += diagnosis_text.each_clip(record["each_clip"])
+    lines += diagnosis_text.each_clip(record.get("each_clip"))
     for row in record.get("left_one_out", []):
         lines.append(
             f"{row['clip']}, predicted from the other clips: off by {row['rmse_before']:.4f} m/s, "
             f"with what was added by {row['rmse_after']:.4f} m/s"
         )
-    lines += [f"- {sentence}" for sentence in found.verdict.advice]
+    lines += [f"- {sentence}" for sentence in record["verdict"]["advice"]]
     return [*lines, f"next: {found.next_command(out)}"]
 
 
@@ -109,7 +109,7 @@ def _parser() -> VerbParser:
         "galileo diagnose clip.mp4                             what is missing is added",
         "galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added",
     )
-    parser.add("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    parser.add("tracks")
     parser.add("add", metavar="auto|none|NAME")
     parser.add_argument(
         "--svg",

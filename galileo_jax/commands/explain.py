@@ -231,11 +231,7 @@ def _parser() -> VerbParser:
         help="write bundle.zip there, too: what somebody needs who is to help, without the film "
         "and without names (default: off)",
     )
-    parser.add("scenario", metavar="NAME")
-    parser.add("ramp_angle", metavar="DEG")
-    parser.add("pixels_per_metre")
-    parser.add("track_units", metavar="UNIT")
-    parser.add("fps")
+    parser.add("scenario", "ramp_angle", "pixels_per_metre", "track_units", "fps")
     parser.add("point", nargs=2, type=float, metavar=("X", "Y"))
     parser.add("engine", "seed")
     return parser

@@ -46,9 +46,7 @@ def _parser() -> VerbParser:
         "galileo fit clip.mp4                                  seconds",
         "galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled",
     )
-    parser.add("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
-    parser.add("method")
-    parser.add("effects", metavar="A,B", help="effects in the model (default: none)")
+    parser.add("tracks", "method", "effects")
     free = "declared quantities to infer: gravity (default: none)"
     parser.add("free", metavar="A,B", help=free)
     clip_options.add_clip_options(parser, out="folder of the run (default runs/CLIP)")

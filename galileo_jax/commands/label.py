@@ -76,7 +76,7 @@ def _parser() -> VerbParser:
     add("origin", nargs=2, metavar=("X", "Y"), **numbers)
     add("origin_sd", metavar="PX")
     add = parser.group("of a track file")
-    add("track_units", metavar="UNIT")
+    add("track_units")
     add("track_y", metavar="WAY")
     add("track_origin", nargs=2, metavar=("X", "Y"), **numbers)
     return parser

@@ -6,6 +6,7 @@ from pathlib import Path
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.commands.options import VerbParser
+from galileo_jax.experiment.settings import NUMBERS
 from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
@@ -16,7 +17,6 @@ LEGEND = (
     "named: probability that the true hypothesis is then named; lead: its mean lead in log odds",
     "hit: probability that object 1 reaches object 2",
 )
-NUMBERS = {"gain_nats": "gain nats", "named": "named", "lead_nats": "lead nats", "hit": "hit"}
 
 
 def main(argv: Sequence[str]) -> None:
@@ -40,7 +40,9 @@ def _lines(ahead: "gx.NextExperiment") -> list[str]:
     rows = ahead.document["settings"][:NUM_SETTINGS]
     names = [name for name in rows[0] if name not in NUMBERS]
     lines = [f"still possible: {odds}", ""]
-    lines.append("".join(f"{name:>10}" for name in (*names, *NUMBERS.values())))
+    lines.append(
+        "".join(f"{name:>10}" for name in (*names, *(n.replace("_", " ") for n in NUMBERS)))
+    )
     for row in rows:
         cells = [f"{row[name]:g}" for name in names]
         cells += ["-" if row[key] is None else _number(row[key]) for key in NUMBERS]

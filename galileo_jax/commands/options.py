@@ -83,6 +83,10 @@ EVERYWHERE: Mapping[str, Mapping[str, Any]] = {
     "engine": {"choices": ENGINES, "metavar": None},
     "pixels_per_metre": {"metavar": "SCALE"},
     "fps": {"metavar": "HZ"},
+    "ramp_angle": {"metavar": "DEG"},
+    "track_units": {"metavar": "UNIT"},
+    "effects": {"metavar": "A,B", "help": "effects in the model (default: none)"},
+    "tracks": {"nargs": "+", "metavar": "CLIP", "help": "video, its yaml, or a csv track"},
 }
 """What argparse is told of arguments that mean the same in every function."""
 

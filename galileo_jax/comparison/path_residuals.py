@@ -30,7 +30,6 @@ class PathResiduals:
         without the constant offset of the tracked point.
       predicted_m: of the fit.
       low_m, high_m: where 95 % of the posterior's draws are.
-      noise_m: tracking error, as stated.
       along, across: tracking errors that the fit leaves, along the path and across it, in units
         of the stated noise.
       phases: of the motion.
@@ -47,7 +46,6 @@ class PathResiduals:
     predicted_m: np.ndarray
     low_m: np.ndarray
     high_m: np.ndarray
-    noise_m: np.ndarray
     along: np.ndarray
     across: np.ndarray
     phases: tuple[Phase, ...]
@@ -97,8 +95,6 @@ def _object(
     # Each draw, like the fit, up to the constant offset of the tracked point.
     moved = moved - np.median(moved, axis=1, keepdims=True)
     low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
-    covariance = observation.covariance_m2[index]
-    noise = np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
     white = np.where(is_tracked, comparison.white[clip][index], np.nan)
     normal = np.stack([-tangent[1], tangent[0], *tangent[2:]])
     labels = comparison.labels[clip][index]
@@ -113,7 +109,6 @@ def _object(
         predicted_m=path,
         low_m=path + low,
         high_m=path + high,
-        noise_m=noise,
         along=np.sum(tangent * white, axis=0),
         across=np.sum(normal * white, axis=0),
         phases=phases_of(labels, times),

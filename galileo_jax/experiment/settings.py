@@ -34,6 +34,9 @@ KNOWN: Mapping[str, tuple[float, float, str]] = {
 angle, the frame rate, how far beyond the foot object 2 stands, whether the objects change places,
 and what they are made to weigh."""
 
+NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
+"""What `choose.Expected` says of a setting, as next.json has it."""
+
 Setting = Mapping[str, float]
 """Name to value, in the unit of `KNOWN`."""
 

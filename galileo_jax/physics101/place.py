@@ -17,7 +17,7 @@ object properties from unlabeled videos, BMVC 2016.
 """
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -95,17 +95,9 @@ def place_of(path: Path) -> Place | None:
     return Place(path, root, folders[-4], (first, second, trial), setup, thing)
 
 
-@dataclass(frozen=True)
-class Labels:
-    """A table of labels.
-
-    Attributes:
-      things: name of an object's folder to its keys.
-      clips: folders to keys of the clip; `target` names object 2, `BY_OBJECT` are by object.
-    """
-
-    things: dict[str, Any] = field(default_factory=dict)
-    clips: dict[str, Any] = field(default_factory=dict)
+Labels = dict[str, dict[str, Any]]
+"""`objects`: name of an object's folder to its keys; `clips`: folders to keys of the clip, of which
+`target` names object 2, and `BY_OBJECT` are by object."""
 
 
 def read_labels(path: Path) -> Labels:
@@ -114,9 +106,7 @@ def read_labels(path: Path) -> Labels:
     Raises:
       InputError: it is no such table.
     """
-    if not path.is_file():
-        return Labels()
-    content = read_mapping(path)
+    content = read_mapping(path) if path.is_file() else {}
     for key in content:
         if key not in ("objects", "clips"):
             raise InputError(f"{path}: {short(key)}: unknown key; known: objects, clips")
@@ -124,7 +114,7 @@ def read_labels(path: Path) -> Labels:
     for key, table in tables.items():
         for name, entry in table.items():
             _mapping(path, f"{key}.{short(name)}", entry)
-    return Labels(tables["objects"], tables["clips"])
+    return tables
 
 
 def content_of(place: Place, labels: Labels) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -136,7 +126,7 @@ def content_of(place: Place, labels: Labels) -> tuple[dict[str, Any], tuple[str,
     declared: dict[str, Any] = {}
     by_object: dict[str, dict[str, Any]] = {}
     for level in place.levels:
-        entry = dict(labels.clips.get(level) or {})
+        entry = dict(labels["clips"].get(level) or {})
         for key in BY_OBJECT:
             values = _mapping(place.labels, f"clips.{level}.{key}", entry.pop(key, None))
             for name, value in values.items():
@@ -153,7 +143,7 @@ def content_of(place: Place, labels: Labels) -> tuple[dict[str, Any], tuple[str,
         {
             "name": re.sub(r"\W", "_", str(name)),
             "shape": "box",
-            **(labels.things.get(name) or {}),
+            **(labels["objects"].get(name) or {}),
             **by_object.get(name, {}),
         }
         for name in names

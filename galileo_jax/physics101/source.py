@@ -1,6 +1,5 @@
 """Physics 101 as a source of clips: loaded, labelled, and told apart by what their labels say."""
 
-import copy
 import json
 from pathlib import Path
 from typing import Any
@@ -10,14 +9,7 @@ from galileo_jax.clip.label import LabelledClip, updated_file
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import SOURCES, ClipSource, SourceFiles
 from galileo_jax.clip.yaml_file import yaml_text
-from galileo_jax.physics101.place import (
-    BY_OBJECT,
-    Labels,
-    Place,
-    check_place,
-    place_of,
-    read_labels,
-)
+from galileo_jax.physics101.place import BY_OBJECT, Place, check_place, place_of, read_labels
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
@@ -36,8 +28,8 @@ def _files(path: Path) -> SourceFiles:
     except InputError:
         said = None
     else:
-        own = [labels.clips.get(level) for level in place.levels]
-        said = [place.levels[-1], labels.things, own]
+        own = [labels["clips"].get(level) for level in place.levels]
+        said = [place.levels[-1], labels["objects"], own]
     return SourceFiles(place.yaml.stem, place.root, paths, json.dumps(said, sort_keys=True))
 
 
@@ -56,8 +48,8 @@ def _label(path: Path, declared: Declaration) -> LabelledClip:
     place = _place(path)
     if declared.scenario is not None:
         raise InputError(f"--scenario: the folders of {place.video} say {place.scenario}")
-    old = read_labels(place.labels)
-    things, clips = copy.deepcopy(old.things), copy.deepcopy(old.clips)
+    labels = read_labels(place.labels)
+    things, clips = labels["objects"], labels["clips"]
     here, objects = declared.clip_values(), declared.object_values()
     if not here and not objects:
         raise InputError(f"{place.video}: nothing to write; see galileo label --help")
@@ -77,9 +69,8 @@ def _label(path: Path, declared: Declaration) -> LabelledClip:
     trial = clips.setdefault(place.levels[-1], {}) if by_trial else {}
     for key, values in by_trial.items():
         trial[key] = (trial.get(key) or {}) | values
-    clip = check_place(place, Labels(things, clips))
-    tables = {"objects": things, "clips": clips}
-    content = {key: table for key, table in tables.items() if table}
+    clip = check_place(place, labels)
+    content = {key: table for key, table in labels.items() if table}
     text, notes = yaml_text(content), ()
     if place.labels.is_file():
         text, notes = updated_file(place.labels, content)

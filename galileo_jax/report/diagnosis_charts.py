@@ -7,7 +7,6 @@ import numpy as np
 
 from galileo_jax.comparison.local_tests import WHOLE
 from galileo_jax.comparison.path_residuals import PathResiduals
-from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.report.chart import Band, Bars, Chart, Line, Mark, Panel, Points, side_by_side
 from galileo_jax.report.diagnosis_text import effects_text
 from galileo_jax.report.fit_charts import residual_panel
@@ -87,23 +86,27 @@ def _residuals(one: PathResiduals, largest: float, title: str = "") -> Panel:
     )
 
 
-def diagnosis_chart(diagnosis: Diagnosis) -> Chart:
+def diagnosis_chart(record: Mapping[str, Any]) -> Chart:
     """The velocity error of each round, and the probabilities of the first candidates."""
-    rounds = rounds_chart(diagnosis.rounds)
-    if not diagnosis.candidates:
+    rounds, shown = rounds_chart(record["history"]), record["candidates"][:NUM_CANDIDATES]
+    if not shown:
         return rounds
-    candidates = candidates_chart(diagnosis.candidates[:NUM_CANDIDATES])
-    panels = (*rounds.panels, *candidates.panels)
+    names, values = [one["effect"] for one in shown], [one["probability"] for one in shown]
+    texts = tuple(f"{value:.3f}" for value in values)
+    bars = Bars(names, values, "accent", "probability", 0.5, texts, is_horizontal=True)
+    candidates = Panel("", (bars,), xlabel="probability", xlim=(0.0, 1.12))
+    panels = (*rounds.panels, candidates)
     return Chart("diagnosis", "velocity error and candidates", panels, panel_px=200)
 
 
-def rounds_chart(rounds: Sequence[Round]) -> Chart:
-    """The velocity error of each round beside what tracking noise alone would give."""
-    errors = [one.comparison.error for one in rounds]
-    rmse = [float(error["rmse"]) for error in errors]
-    names = [f"{i}. {effects_text(one.effects)}" for i, one in enumerate(rounds, 1)]
+def rounds_chart(rounds: Sequence[Mapping[str, Any]]) -> Chart:
+    """The velocity error of each round beside what tracking noise alone would give.
+
+    `rounds`: `history` of diagnosis.json.
+    """
+    rmse, noise = ([float(one[key]) for one in rounds] for key in ("rmse", "noise"))
+    names = [f"{i}. {effects_text(one['effects'])}" for i, one in enumerate(rounds, 1)]
     texts = tuple(f"{value:.4f}" for value in rmse)
-    noise = [float(error["noise"]) for error in errors]
     marks = (
         Bars(names[:-1], rmse[:-1], "soft", "velocity error", 0.3, texts[:-1], opacity=0.55),
         Bars(names[-1:], rmse[-1:], "accent", "velocity error of the last", 0.3, texts[-1:]),
@@ -121,60 +124,49 @@ def rounds_chart(rounds: Sequence[Round]) -> Chart:
     return Chart("rounds", label, (panel,))
 
 
-def candidates_chart(candidates: Sequence[Candidate]) -> Chart:
-    """The probability of each candidate, the most probable on top."""
-    names = [one.name for one in candidates]
-    values = [one.probability for one in candidates]
-    texts = tuple(f"{value:.3f}" for value in values)
-    bars = Bars(names, values, "accent", "probability", 0.5, texts, is_horizontal=True)
-    panel = Panel("", (bars,), xlabel="probability", xlim=(0.0, 1.12))
-    label = "probabilities of the candidates: " + ", ".join(
-        f"{name} {text}" for name, text in zip(names, texts, strict=True)
-    )
-    return Chart("candidates", label, (panel,))
+def known_objects(missing: Mapping[str, Any]) -> list[str]:
+    """The objects that were tracked while they moved: of others nothing is known.
+
+    `missing`: `missing_force` of diagnosis.json.
+    """
+    values = {name: _array(one, "acceleration_m_s2") for name, one in missing["objects"].items()}
+    return [name for name, value in values.items() if np.isfinite(value).any()]
 
 
-def known_objects(missing: MissingForce, names: Sequence[str]) -> dict[int, str]:
-    """By index the objects that were tracked while they moved: of others nothing is known."""
-    known = [bool(np.isfinite(one).any()) for one in missing.acceleration_m_s2]
-    return {
-        i: name for i, (name, is_known) in enumerate(zip(names, known, strict=True)) if is_known
-    }
-
-
-def missing_force_chart(missing: MissingForce, names: Mapping[int, str]) -> Chart:
+def missing_force_chart(missing: Mapping[str, Any], names: Sequence[str]) -> Chart:
     """The acceleration that the model lacks, with its 95 % band, against time, speed and place.
 
-    `names`: of the objects that are drawn, by their index.
+    Args:
+      missing: `missing_force` of diagnosis.json.
+      names: of the objects that are drawn.
     """
-    objects = list(names)
-    value, sd = missing.acceleration_m_s2[objects], missing.sd_m_s2[objects]
+    time, objects = _array(missing, "time_s"), missing["objects"]
+    value = np.stack([_array(objects[name], "acceleration_m_s2") for name in names])
+    sd = np.stack([_array(objects[name], "sd_m_s2") for name in names])
     spread = 3 * float(np.nanmedian(np.where(np.isfinite(value), sd, np.nan)))
     ylim = (min(0.0, np.nanmin(value)) - spread, max(0.0, np.nanmax(value)) + spread)
     of_time: list[Mark] = []
-    of_speed: list[Mark] = []
-    of_path: list[Mark] = []
-    for index, name, own, own_sd in zip(objects, names.values(), value, sd, strict=True):
-        colour, time = object_colour(index), missing.time_s
+    across: dict[str, list[Mark]] = {"speed_m_s": [], "path_m": []}
+    for name, own, own_sd in zip(names, value, sd, strict=True):
+        colour = object_colour(list(objects).index(name))
         known = np.flatnonzero(np.isfinite(own))
         chosen = known[:: max(1, len(known) // NUM_POINTS)]
         label = "missing" if len(names) == 1 else name
-        of_time.append(Band(time, own - 1.96 * own_sd, own + 1.96 * own_sd, colour, "95 %", 0.25))
-        of_time.append(Line(time, own, colour, label))
-        for marks, across in ((of_speed, missing.speed_m_s), (of_path, missing.path_m)):
-            at = across[index][chosen]
+        of_time += _with_band(time, own, own_sd, colour, label)
+        for key, marks in across.items():
+            at = _array(objects[name], key)[chosen]
             marks.append(Points(at, own[chosen], colour, label, sd=own_sd[chosen]))
+    listed = ", ".join(names)
     panels = tuple(
         Panel("missing, m/s²", tuple(marks), title=title, xlabel=xlabel, ylim=ylim, level=0.0)
         for marks, xlabel, title in (
-            (of_time, "time since the release, s", ", ".join(names.values())),
-            (of_speed, "speed, m/s", ""),
-            (of_path, "along the path, m", ""),
+            (of_time, "time since the release, s", listed),
+            (across["speed_m_s"], "speed, m/s", ""),
+            (across["path_m"], "along the path, m", ""),
         )
     )
-    listed = ", ".join(names.values())
     label = f"acceleration that the model of {listed} lacks, against time, speed and position"
-    return Chart(f"missing_{'_'.join(names.values())}", label, panels)
+    return Chart(f"missing_{'_'.join(names)}", label, panels)
 
 
 def friction_chart(rows: Sequence[Mapping[str, Any]], clip: str) -> Chart:
@@ -186,11 +178,22 @@ def friction_chart(rows: Sequence[Mapping[str, Any]], clip: str) -> Chart:
     """
     marks: list[Mark] = []
     for index, row in enumerate(one for one in rows if one["clip"] == clip):
-        colour = object_colour(index)
-        path, mean, sd = (np.array(row[key], float) for key in ("path_m", "mean", "sd"))
-        marks.append(Band(path, mean - 1.96 * sd, mean + 1.96 * sd, colour, "95 %", 0.25))
-        marks.append(Line(path, mean, colour, row["object"]))
+        path, mean, sd = (_array(row, key) for key in ("path_m", "mean", "sd"))
+        marks += _with_band(path, mean, sd, object_colour(index), row["object"])
     panel = Panel(
         "friction coefficient", tuple(marks), title=clip, xlabel="along the path, m", level=0.0
     )
     return Chart(f"friction_{clip}", f"friction coefficient along the way in {clip}", (panel,))
+
+
+def _with_band(
+    x: np.ndarray, mean: np.ndarray, sd: np.ndarray, colour: str, name: str
+) -> tuple[Band, Line]:
+    """A curve and its 95 % band."""
+    band = Band(x, mean - 1.96 * sd, mean + 1.96 * sd, colour, "95 %", 0.25)
+    return band, Line(x, mean, colour, name)
+
+
+def _array(record: Mapping[str, Any], key: str) -> np.ndarray:
+    """A list of numbers; NaN where a file has null."""
+    return np.array(record[key], float)

@@ -6,9 +6,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from galileo_jax.clip.schema import Clip
-from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
-from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
+from galileo_jax.comparison.path_residuals import PathResiduals
 from galileo_jax.diagnosis.reasons import p_text
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
@@ -43,62 +44,70 @@ LEFT_OUT = "Error of the velocity without and with the added effect."
 def write_diagnosis_page(
     path: Path,
     title: str,
-    trials: JointProblem,
-    diagnosis: Diagnosis,
     record: Mapping[str, Any],
+    paths: Sequence[Sequence[PathResiduals]],
     clips: Sequence[Clip],
+    models: Sequence[tuple[JointProblem, np.ndarray]],
     *,
     truth: str | None,
     command: str,
     next_command: str,
-    seed: int,
 ) -> None:
     """Writes the page; each figure in it can be saved as SVG.
 
-    `record`: diagnosis.json. `truth`: the effect hidden in a synthetic clip, None where that is not
-    known. `command` makes the page again, `next_command` is to be run next.
+    Args:
+      path: where to.
+      title: of which clips.
+      record: diagnosis.json.
+      paths: of every round, all objects along their paths.
+      clips: that were diagnosed.
+      models: of every round, with its parameters.
+      truth: the effect hidden in a synthetic clip; None where that is not known.
+      command: that makes the page again.
+      next_command: to be run next.
     """
-    verdict, rounds = diagnosis.verdict, diagnosis.rounds
-    hypotheses = {_title(one): one.hypothesis for one in rounds}
-    models = {name: one.of(trials) for name, one in hypotheses.items()}
-    fitted = {name: models[name].theta(one.fit.z, one.fit.free) for name, one in hypotheses.items()}
-    paths = _residuals(trials, diagnosis, seed)
+    verdict, names = record["verdict"], _titles(record)
     alone = diagnosis_text.each_clip(record.get("each_clip"))
     sections = [
-        html.section("Why", html.items(why.sentence for why in verdict.reasons)),
-        _rounds(rounds, record["history"]),
-        _candidates(diagnosis, record["candidates"]),
-        motion(clips, trials, fitted, models),
-        failures(diagnosis.base, paths[0], f": {_title(rounds[0])}"),
+        html.section("Why", html.items(why["sentence"] for why in record["reasons"])),
+        _rounds(record["history"]),
+        _candidates(record),
+        motion(clips, dict(zip(names, models, strict=True))),
+        failures(record["adequate"], paths[0], f": {names[0]}"),
         *(
             html.chart_section(f"Added: {name}", ADDED, charts)
-            for name, charts in _before_after(diagnosis, paths)
+            for name, charts in before_after_charts(record, paths).items()
         ),
-        _missing(diagnosis, record, trials.problems[0].observation.names),
+        _missing(record),
         _friction(record.get("friction_along_way", [])),
-        cells(diagnosis.base, several=len(trials.problems) > 1),
+        cells(record["where"], several=len(clips) > 1),
         html.section("Each clip alone", html.items(alone)),
         _left_one_out(record.get("left_one_out", [])),
-        provenance(command, clips, engine_and_seed(trials, seed)),
+        provenance(command, clips, engine_and_seed(record)),
     ]
     hidden = "" if truth is None else html.prose(f"Truth: {truth}.")
     go_on = f'<p class="soft">Next: {html.code(next_command)}</p>'
-    more = "\n".join([hidden, html.items(verdict.advice), go_on])
-    lead, is_good = diagnosis_text.verdict(diagnosis), verdict.status != "unknown"
-    html.write_page(path, "diagnosis", title, lead, sections, more, is_good)
+    more = "\n".join([hidden, html.items(verdict["advice"]), go_on])
+    is_good = verdict["status"] != "unknown"
+    html.write_page(path, "diagnosis", title, record["sentence"], sections, more, is_good)
 
 
-def before_after_charts(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> list[Chart]:
-    """The residuals before and after each effect that was added, one chart for each object."""
-    paths = _residuals(trials, diagnosis, seed)
-    return [chart for _, charts in _before_after(diagnosis, paths) for chart in charts]
+def before_after_charts(
+    record: Mapping[str, Any], paths: Sequence[Sequence[PathResiduals]]
+) -> dict[str, list[Chart]]:
+    """By the effects of each round after the first, a chart for each object: before and after."""
+    return {
+        name: [before_after_chart(*two, (before, name)) for two in zip(old, new, strict=True)]
+        for (old, before), (new, name) in pairwise(zip(paths, _titles(record), strict=True))
+    }
 
 
-def _title(one: Round) -> str:
-    return diagnosis_text.effects_text(one.effects)
+def _titles(record: Mapping[str, Any]) -> list[str]:
+    """What the rounds' models are called."""
+    return [diagnosis_text.effects_text(row["effects"]) for row in record["history"]]
 
 
-def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> str:
+def _rounds(history: Sequence[Mapping[str, Any]]) -> str:
     frictions = [name for name in ("k1", "k2") if name in history[0]]
     rows = [
         [
@@ -110,41 +119,15 @@ def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> st
     head = ["model with", "rmse, m/s", "chi2 per dof", "p", *frictions]
     marks = [("fill", "accent", "velocity error"), ("dashed", "ink", "tracking noise alone")]
     key = html.legend(marks)
-    charts = html.chart_section("Rounds", ROUNDS, [rounds_chart(rounds)], "stack", key)
+    charts = html.chart_section("Rounds", ROUNDS, [rounds_chart(history)], "stack", key)
     return f"{charts}\n{html.table(head, rows)}"
 
 
-def _residuals(
-    trials: JointProblem, diagnosis: Diagnosis, seed: int
-) -> list[tuple[PathResiduals, ...]]:
-    """Of every round, those of all objects."""
-    return [
-        path_residuals(one.hypothesis.of(trials), one.hypothesis.fit, one.comparison, seed)
-        for one in diagnosis.rounds
-    ]
-
-
-def _before_after(
-    diagnosis: Diagnosis, paths: Sequence[Sequence[PathResiduals]]
-) -> list[tuple[str, list[Chart]]]:
-    """For each round after the first the effects of its model, and a chart for each object."""
-    rounds = pairwise(zip(paths, map(_title, diagnosis.rounds), strict=True))
-    return [
-        (name, [before_after_chart(*two, (before, name)) for two in zip(old, new, strict=True)])
-        for (old, before), (new, name) in rounds
-    ]
-
-
-def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -> str:
-    rows = [
-        _candidate(one.effects, entry)
-        for one, entry in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False)
-    ]
-    none, base = diagnosis.probability_none, diagnosis.base
-    chi2 = f"{base.error['chi2_per_dof']:.2f}"
-    rows.append(
-        ["none", _bar(none), f"{none:.3f}", "", "+0.0", "+0.0", chi2, p_text(base.p_value), ""]
-    )
+def _candidates(record: Mapping[str, Any]) -> str:
+    candidates, none = record["candidates"], record["probability_none"]
+    rows = [_candidate(entry) for entry in candidates[:NUM_CANDIDATES]]
+    chi2, p = f"{record['error']['chi2_per_dof']:.2f}", p_text(record["p_value"])
+    rows.append(["none", _bar(none), f"{none:.3f}", "", "+0.0", "+0.0", chi2, p, ""])
     head = ["effect", "", "probability", "strength", "log evidence", "log prior", "chi2 per dof",
             "p", "not distinguished from"]  # fmt: skip
     if not any(row[-1] for row in rows):
@@ -154,8 +137,8 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
     return html.section("Candidates", html.table(head, rows, ONLY_WIDE), note if rest > 0 else "")
 
 
-def _candidate(effects: Sequence[str], entry: Mapping[str, Any]) -> list[str]:
-    texts = diagnosis_text.strength_texts(effects, entry)
+def _candidate(entry: Mapping[str, Any]) -> list[str]:
+    texts = diagnosis_text.strength_texts(entry)
     named = [text if len(texts) == 1 else f"{name} = {text}" for name, text in texts.items()]
     return [
         _wrapped(_breakable(entry["effect"]).replace("+", "+<wbr>")),
@@ -183,11 +166,10 @@ def _bar(share: float) -> html.Html:
     return html.Html(f'<div class="bar"><div style="width:{100 * share:.1f}%"></div></div>')
 
 
-def _missing(diagnosis: Diagnosis, record: Mapping[str, Any], names: Sequence[str]) -> str:
-    if diagnosis.missing is None:
+def _missing(record: Mapping[str, Any]) -> str:
+    if (missing := record.get("missing_force")) is None:
         return ""
-    known = known_objects(diagnosis.missing, names)
-    charts = [missing_force_chart(diagnosis.missing, {i: name}) for i, name in known.items()]
+    charts = [missing_force_chart(missing, [name]) for name in known_objects(missing)]
     caption = (
         "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "
         f"inferred without assuming a formula. {diagnosis_text.formula_text(record)} In a formula "

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.comparison.compare import Comparison
-from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
+from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
@@ -35,16 +34,16 @@ def round_text(row: Mapping[str, Any]) -> str:
     return f"{text}, imperfect" if row.get("imperfect") and not row["effects"] else text
 
 
-def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
-    """Whether the model is adequate, in one sentence; or why nobody can tell."""
-    if comparison.no_verdict is not None:
-        return f"{comparison.no_verdict}."
-    equals = p_equals(comparison.p_value)
-    model = f"with {effects_text(effects)} " if effects else ""
-    if not comparison.is_adequate:
+def adequacy(record: Mapping[str, Any]) -> str:
+    """Whether the model of compare.json is adequate, in one sentence; or why nobody can tell."""
+    if record["no_verdict"] is not None:
+        return f"{record['no_verdict']}."
+    equals = p_equals(record["p_value"])
+    model = f"with {effects_text(record['effects'])} " if record["effects"] else ""
+    if not record["adequate"]:
         return f"The model {model}is not adequate: the data contradict it ({equals})."
     text = f"The model {model}is adequate: its residuals look like noise ({equals})."
-    return f"{text} {noise_text(comparison.noise_scale)}" if comparison.is_noise_misstated else text
+    return f"{text} {noise_text(record['noise_scale'])}" if record["noise_misstated"] else text
 
 
 def noise_text(noise_scale: Sequence[float]) -> str:
@@ -53,13 +52,12 @@ def noise_text(noise_scale: Sequence[float]) -> str:
     return f"The tracking errors are {size} times as large as stated."
 
 
-def why(found: Sequence[Reason]) -> list[str]:
+def why(reasons: Sequence[Mapping[str, Any]]) -> list[str]:
     """The rules that fired, one sentence each; of hypotheses that could not be confused, one."""
-    apart = [one for one in found if one.rule == "told_apart"]
-    if len(apart) <= MOST_APART:
-        return [one.sentence for one in found]
-    said = [one.sentence for one in found if one.rule != "told_apart"]
-    return [*said, f"A clip like this one would rule out {len(apart)} others (report.html)."]
+    said = [one["sentence"] for one in reasons if one["rule"] != "told_apart"]
+    if (apart := len(reasons) - len(said)) <= MOST_APART:
+        return [one["sentence"] for one in reasons]
+    return [*said, f"A clip like this one would rule out {apart} others (report.html)."]
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -232,9 +230,7 @@ def next_command(
     return command_line("fit", clips, effects_from=files, effects=",".join(effects))
 
 
-def strength_texts(
-    effects: Sequence[str], entry: Mapping[str, Any], sign: str = "+-"
-) -> dict[str, str]:
+def strength_texts(entry: Mapping[str, Any], sign: str = "+-") -> dict[str, str]:
     """The strengths of a candidate's effects as text, by name; one per clip where they differ.
 
     Where no object was weighed, a force is given per mass: only that is determined. `entry`: of the
@@ -242,7 +238,7 @@ def strength_texts(
     """
     derived, parameters = entry.get("derived", {}), entry["parameters"]
     found = {}
-    for effect in effects:
+    for effect in entry["effect"].split("+"):
         for name, strength in parameters.items():
             if name != effect and not name.removeprefix(f"{effect}_").isdecimal():
                 continue

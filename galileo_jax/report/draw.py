@@ -49,7 +49,8 @@ def to_plotly(chart: Chart) -> "go.Figure":
 
 def to_svg(chart: Chart) -> str:
     """The chart as an SVG document; the same text for the same chart."""
-    return save_svg(_drawn(chart), chart.name)
+    with matplotlib_style(chart.name):
+        return save_svg(_drawn(chart), chart.name)
 
 
 def write_svgs(folder: Path, charts: Iterable[Chart]) -> list[Path]:
@@ -69,34 +70,34 @@ def write_picture(path: Path, chart: Chart) -> Path:
 
 
 def _drawn(chart: Chart) -> "Figure":
+    """The chart in the style that is set."""
     from matplotlib.figure import Figure
 
     size = layout_of(chart)
     width = size.width + SVG_LEFT_PX
-    with matplotlib_style(chart.name):
-        drawn = Figure(figsize=(width / PX_PER_INCH, size.height / PX_PER_INCH))
-        drawn.subplots_adjust(
-            left=(size.left + SVG_LEFT_PX) / width, right=1 - RIGHT_PX / width,
-            bottom=size.bottom / size.height, top=1 - size.top / size.height,
-            hspace=size.row_gap / size.panel_height, wspace=size.column_gap / size.panel_width,
-        )  # fmt: skip
-        shared = "col" if chart.shares_x else False
-        grid = drawn.subplots(len(chart.rows), chart.columns, squeeze=False, sharex=shared)
-        for axes, panel in zip(grid.flat, chart.panels, strict=True):
-            if panel is None:
-                axes.set_visible(False)
-                continue
-            if size.panel_width == CELL_PX:
-                axes.locator_params(axis="x", nbins=2)
-                axes.tick_params(labelsize=7)
-            _draw_panel(axes, panel)
-        handles, names = grid[0, 0].get_legend_handles_labels()
-        named = dict(zip(names, handles, strict=True))  # each name once
-        if 1 < len(named) <= MOST_NAMES:
-            look = {"loc": "best", "handlelength": 1.4, "labelspacing": 0.25}
-            grid[0, 0].legend(named.values(), named.keys(), **look)
-        drawn.align_ylabels()
-        return drawn
+    drawn = Figure(figsize=(width / PX_PER_INCH, size.height / PX_PER_INCH))
+    drawn.subplots_adjust(
+        left=(size.left + SVG_LEFT_PX) / width, right=1 - RIGHT_PX / width,
+        bottom=size.bottom / size.height, top=1 - size.top / size.height,
+        hspace=size.row_gap / size.panel_height, wspace=size.column_gap / size.panel_width,
+    )  # fmt: skip
+    shared = "col" if chart.shares_x else False
+    grid = drawn.subplots(len(chart.rows), chart.columns, squeeze=False, sharex=shared)
+    for axes, panel in zip(grid.flat, chart.panels, strict=True):
+        if panel is None:
+            axes.set_visible(False)
+            continue
+        if size.panel_width == CELL_PX:
+            axes.locator_params(axis="x", nbins=2)
+            axes.tick_params(labelsize=7)
+        _draw_panel(axes, panel)
+    handles, names = grid[0, 0].get_legend_handles_labels()
+    named = dict(zip(names, handles, strict=True))  # each name once
+    if 1 < len(named) <= MOST_NAMES:
+        look = {"loc": "best", "handlelength": 1.4, "labelspacing": 0.25}
+        grid[0, 0].legend(named.values(), named.keys(), **look)
+    drawn.align_ylabels()
+    return drawn
 
 
 def _draw_panel(axes: "Axes", panel: Panel) -> None:

@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.diagnosis.reasons import p_text
-from galileo_jax.experiment.settings import KNOWN, known_as
+from galileo_jax.experiment.settings import KNOWN, NUMBERS, known_as
 from galileo_jax.report import html_page as html
 from galileo_jax.report.chart import Chart, Panel, Points
 
 NUM_ROWS = 20
-NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
 
 
 def write_next_page(path: Path, record: Mapping[str, Any]) -> None:

@@ -197,6 +197,14 @@ def chi2_text(error: Mapping[str, Any]) -> str:
     return f"chi2 per degree of freedom {chi2:.2f}" if known else "chi2 not known"
 
 
+def error_text(error: Mapping[str, Any]) -> str:
+    """What the fit leaves, as numbers: chi2, and the velocity error beside that of noise."""
+    return (
+        f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
+        f"{error['noise']:.4f})"
+    )
+
+
 def _of_chi2(error: Mapping[str, Any]) -> str:
     """The same in a sentence."""
     chi2 = error["chi2_per_dof"]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.report.chart import Band, Chart, Line, Panel, Points, time_limits
 from galileo_jax.report.diagnosis_charts import friction_chart, known_objects, missing_force_chart
 from galileo_jax.report.plotly_figure import dark, figure, to_json
@@ -85,11 +84,7 @@ def residual_figure(
 
 def missing_figure(record: Mapping[str, Any], is_dark: bool) -> dict[str, Any]:
     """The acceleration that the model lacks, against time, speed and place."""
-    entries = record["objects"]
-    keys = ("acceleration_m_s2", "sd_m_s2", "path_m", "speed_m_s")
-    arrays = {key: np.array([one[key] for one in entries.values()], float) for key in keys}
-    missing = MissingForce(np.array(record["time_s"], float), **arrays)
-    first, *others = missing_force_chart(missing, known_objects(missing, list(entries))).panels
+    first, *others = missing_force_chart(record, known_objects(record)).panels
     beside = (replace(one, ylabel="", has_y_ticks=False) for one in others if one)
     panels = (replace(first, title=""), *beside) if first else ()
     return _figure_of(Chart("", "", panels, columns=len(panels)), is_dark)

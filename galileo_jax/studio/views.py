@@ -134,7 +134,7 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
     return {
         "p_value": check.p_value,
         "is_adequate": check.is_adequate,
-        "sentence": adequacy(check.found, check.fit.effects),
+        "sentence": adequacy(check.document),
         "stretches": stretches,
     }
 

@@ -69,7 +69,7 @@ def test_nothing_contradicts_anything_else(tmp_path, scenario, case):
     chi2, said = error["chi2_per_dof"], " ".join(fit_quality(fit.result))
     (stated,) = re.findall(r"freedom ([\d.]+)", chi2_text(error))
     assert float(stated) == pytest.approx(chi2, abs=0.006)
-    lead = adequacy(check.found, check.fit.effects)
+    lead = adequacy(check.document)
     fails = [path for path in check.paths if path.failing_s is not None]
     assert ("not adequate" in lead) == (not check.is_adequate)
     if check.is_adequate:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.comparison.path_residuals import path_residuals
+from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.prediction.extrapolate import extrapolate
 from galileo_jax.prediction.posterior_predictive import posterior_predictive
 from galileo_jax.report.diagnosis_charts import comparison_chart, diagnosis_chart
@@ -59,7 +60,7 @@ def test_a_comparison_shades_where_the_model_fails(trials):
 
 def test_a_diagnosis_has_the_errors_of_rounds_and_the_probabilities(trials):
     diagnosis = diagnosis_of(trials, "named")
-    figure: Any = to_plotly(diagnosis_chart(diagnosis))
+    figure: Any = to_plotly(diagnosis_chart(diagnosis_document(trials, diagnosis, 0)))
     (bars,) = traces(figure, "probability")
     assert list(bars.y) == ["air_drag", "viscous_drag", "release_delay"]
     assert bars.x == pytest.approx([0.9, 0.09, 0.01])
@@ -70,9 +71,8 @@ def test_a_diagnosis_has_the_errors_of_rounds_and_the_probabilities(trials):
 
 def test_a_diagnosis_without_candidates_has_one_bar(trials):
     diagnosis = diagnosis_of(trials, "none")
-    figure: Any = to_plotly(
-        diagnosis_chart(type(diagnosis)(diagnosis.rounds, (), diagnosis.verdict))
-    )
+    bare = type(diagnosis)(diagnosis.rounds, (), diagnosis.verdict)
+    figure: Any = to_plotly(diagnosis_chart(diagnosis_document(trials, bare, 0)))
     assert [list(bar.x) for bar in figure.data if bar.type == "bar"] == [["1. no effects"]]
 
 

@@ -92,7 +92,7 @@ def _candidate(tab: Tab, entry: Mapping[str, Any], verdict_law: str | None, is_b
         ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
         with ui.element("div").classes("bar2"):
             ui.element("i").style(f"width: {100 * probability:.1f}%")
-        said = strength or ", ".join(strength_texts(effects, entry, "±").values())
+        said = strength or ", ".join(strength_texts(entry, "±").values())
         ui.label(said).classes("strength")
         if set(FORM_NAMES) & set(effects):  # they can be tried, not added
             ui.label("form").classes("small soft").props('title="a form without a name"')
