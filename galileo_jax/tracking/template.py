@@ -19,7 +19,6 @@ PLAIN = 2.0e3
 levels its place would be known to 0.1 px only."""
 WINDOW_PX = 21  # side of the region of unknown size: the object and some of what is around it
 ALWAYS = 0.99  # of the exposure that the object covers a pixel that is compared
-TURNED_PX = 1.0  # at the rim, during the exposure: what turns less is not smeared round its centre
 MIN_REGION_SHARE = 0.3  # of the sharp region that a smeared one keeps at least
 
 
@@ -77,9 +76,7 @@ class Template:
         least, region = MIN_REGION_SHARE * self.region.mean(), share >= ALWAYS
         if region.mean() < least:
             region = share >= np.quantile(share, 1 - least)
-        # A smear along a line hides turns only in part, one round the centre may hide them all.
-        is_along = abs(motion[2]) * self.radius < TURNED_PX
-        return Target(smeared, region, width_px, self.shows_turns if is_along else None)
+        return Target(smeared, region, width_px, self.shows_turns)
 
     def sharp(self, width_px: float) -> Target:
         """What a patch looks like that does not move."""

@@ -108,7 +108,9 @@ def test_scatter_that_is_a_shared_error_keeps_no_row_from_its_mean():
     assert averaged.modes_m is not None
     shared = np.einsum("mt,mt->t", averaged.modes_m[:, 0, 0], averaged.modes_m[:, 0, 0])
     error = averaged.position_m[0, 0] - 0.3 * averaged.times_s
-    assert np.mean(error**2 / (shared + averaged.covariance_m2[0, 0, 0])) == pytest.approx(1, abs=0.2)
+    assert np.mean(error**2 / (shared + averaged.covariance_m2[0, 0, 0])) == pytest.approx(
+        1, abs=0.2
+    )
 
 
 def test_two_objects_have_half_the_rows_of_one():

@@ -26,6 +26,26 @@ class Box:
         return cv2.resize(coarse.astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
 
 
+@dataclass(frozen=True)
+class Ringed(Box):
+    """A box with a ring, off its middle, and a few letters beside it."""
+
+    size_px: tuple[int, int] = (56, 38)
+    ring_px: tuple[float, float] = (17.0, 17.0)  # the ring's middle, from the box's upper left
+    letters: str = "TEE"
+
+    def texture(self) -> np.ndarray:
+        width, height = (FINE * n for n in self.size_px)
+        drawn = np.full((height, width), 80, np.uint8)
+        cv2.rectangle(drawn, (28, 28), (width - 29, height - 29), 205, -1)
+        middle = tuple(round(FINE * n) for n in self.ring_px)
+        cv2.circle(drawn, middle, 32, 90, -1, cv2.LINE_AA)
+        cv2.circle(drawn, middle, 18, 180, -1, cv2.LINE_AA)
+        place = (middle[0] + 40, middle[1] - 4)
+        cv2.putText(drawn, self.letters, place, cv2.FONT_HERSHEY_SIMPLEX, 1.2, 30, 5)
+        return drawn.astype(np.float32)
+
+
 def scene(size_px: tuple[int, int], seed: int = 9) -> np.ndarray:
     """A quiet background, at the fine resolution, `[height, width]` float32."""
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.template import Outline, grey, template_at
 from galileo_jax.tracking.tracker import Start, track_video
-from tests.tracking.moving_box import Box, film, slide
+from tests.tracking.moving_box import Box, Ringed, film, slide
 
 pytestmark = pytest.mark.video
 
@@ -121,6 +121,22 @@ def test_point_beside_the_centre_turns_with_the_object():
     expected = path[:, :2] + np.stack([6 * c - 3 * s, 6 * s + 3 * c], axis=1)
     # The region reaches past the box on one side, over the background.
     assert np.median(np.linalg.norm(track.position_px[0] - expected, axis=1)) < 0.1
+
+
+def test_a_ring_does_not_turn_by_itself_where_it_is_smeared():
+    """Marked on a ring, whose letters hardly show how it turns: less so, smeared along its way."""
+    box = Ringed()
+    way = slide()
+    path = np.concatenate([np.repeat(way[:1], 12, axis=0), way, np.repeat(way[-1:], 12, axis=0)])
+    off = np.array(box.ring_px) + (1.5, 1.0) - np.array(box.size_px) / 2
+    frames = film([(box, path)], share=0.5, size_px=(320, 130))
+    start = Start("tin", tuple(path[0, :2] + off), Outline(None))
+    track = track_video(lambda: iter(frames), [start], np.arange(len(frames)) / FPS)
+    assert track.is_visible.all()
+    assert np.abs(track.angle_rad[0] - path[:, 2])[[*range(30), *range(50, len(path))]].max() < 0.05
+    c, s = np.cos(path[:, 2]), np.sin(path[:, 2])
+    arm = np.stack([c * off[0] - s * off[1], s * off[0] + c * off[1]], axis=1)
+    assert np.median(np.linalg.norm(errors(track, path + np.c_[arm, 0 * c]), axis=1)) < 0.2
 
 
 def test_frames_before_the_first_are_not_visible():
