@@ -81,7 +81,7 @@ def _weights(
 def _of_group(observation: Observation, group: slice, around: slice) -> np.ndarray | None:
     """The weights of the frames `around` in the mean of `group`; None: they stay as they are."""
     times, mask = observation.times_s[around], observation.mask[:, around]
-    is_seen = mask.any(axis=1)
+    is_seen = np.asarray(mask.any(axis=1))
     width = group.stop - group.start
     terms = min(MOST_TERMS, len(times) // 2 + 1)
     if width < 2 or len(times) < FEWEST or not (mask.all(axis=1) == is_seen).all():

@@ -128,7 +128,7 @@ def test_a_ring_does_not_turn_by_itself_where_it_is_smeared():
     box = Ringed()
     way = slide()
     path = np.concatenate([np.repeat(way[:1], 12, axis=0), way, np.repeat(way[-1:], 12, axis=0)])
-    off = np.array(box.ring_px) + (1.5, 1.0) - np.array(box.size_px) / 2
+    off = np.array(box.ring_px) + np.array([1.5, 1.0]) - np.array(box.size_px) / 2
     frames = film([(box, path)], share=0.5, size_px=(320, 130))
     start = Start("tin", tuple(path[0, :2] + off), Outline(None))
     track = track_video(lambda: iter(frames), [start], np.arange(len(frames)) / FPS)
