@@ -16,15 +16,21 @@ from jaxtyping import Float
 
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
-MOST_VALUES = 1000  # coordinates that a fit compares: what it costs grows with their square
+MOST_ROWS, MOST_VALUES = (
+    500,
+    1000,
+)  # of a table; coordinates of a film: costs grow with their square
 FEWEST, MOST_TERMS = 4, 6  # rows, and terms of p: no more than half of its rows and one
 CLEAR = 4.0  # sds by which chi2 may be beyond what is expected
 
 
 def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]]:
-    """The observation with about `MOST_VALUES` values, and a line that says so; if fewer, as is."""
+    """The observation with about as many rows, and a line that says so; as it is, if fewer."""
     seen = int(observation.mask.any(axis=0).sum())
-    size = math.ceil(int(observation.mask.sum()) * observation.position_m.shape[1] / MOST_VALUES)
+    size = math.ceil(seen / MOST_ROWS)
+    if observation.is_tracked_here:
+        values = int(observation.mask.sum()) * observation.position_m.shape[1]
+        size = math.ceil(values / MOST_VALUES)
     if size < 2:
         return observation, []
     weights, kept = _weights(observation, size)

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.average_rows import MOST_VALUES, with_rows_averaged
+from galileo_jax.measurement.average_rows import MOST_ROWS, with_rows_averaged
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from tests.measurement.seen import seen
 
 SD_M = 5e-4
-MOST_ROWS = MOST_VALUES // 2  # of one object in two axes
 
 
 def went(way_m: np.ndarray, times_s: np.ndarray) -> Observation:
@@ -113,7 +112,7 @@ def test_scatter_that_is_a_shared_error_keeps_no_row_from_its_mean():
     )
 
 
-def test_two_objects_have_half_the_rows_of_one():
+def test_two_objects_of_a_film_have_half_the_rows_of_one():
     times = np.arange(MOST_ROWS) / 120
     one = went(0.3 * times, times)
     both = replace(
@@ -123,6 +122,8 @@ def test_two_objects_have_half_the_rows_of_one():
         covariance_m2=np.concatenate([one.covariance_m2, one.covariance_m2]),
         mask=np.concatenate([one.mask, one.mask]),
     )
+    assert with_rows_averaged(both) == (both, []), "of a table rows count"
+    both = replace(both, noise_known_to=0.1)
     assert len(with_rows_averaged(both)[0].times_s) < 0.6 * MOST_ROWS
 
 
