@@ -16,21 +16,18 @@ from jaxtyping import Float
 
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
-MOST_ROWS, MOST_VALUES = (
-    500,
-    1000,
-)  # of a table; coordinates of a film: costs grow with their square
+MOST_ROWS = 500
 FEWEST, MOST_TERMS = 4, 6  # rows, and terms of p: no more than half of its rows and one
 CLEAR = 4.0  # sds by which chi2 may be beyond what is expected
 
 
 def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]]:
-    """The observation with about as many rows, and a line that says so; as it is, if fewer."""
+    """The observation with about `MOST_ROWS` rows, and a line that says so; as it is, if fewer."""
     seen = int(observation.mask.any(axis=0).sum())
-    size = math.ceil(seen / MOST_ROWS)
-    if observation.is_tracked_here:
-        values = int(observation.mask.sum()) * observation.position_m.shape[1]
-        size = math.ceil(values / MOST_VALUES)
+    rows = seen
+    if observation.is_tracked_here:  # as many as one object in a plane has with as many values
+        rows = observation.mask.sum() * observation.position_m.shape[1] / 2
+    size = math.ceil(rows / MOST_ROWS)
     if size < 2:
         return observation, []
     weights, kept = _weights(observation, size)
