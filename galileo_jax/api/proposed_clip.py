@@ -63,7 +63,8 @@ def yaml_of(known: Understood, answers: Answers) -> str:
         return yaml_text(_of_film(known, scenario, answers))
     table = known.look.table
     assert table is not None  # of a table
-    text = proposed_yaml(known.source, table.motion(1), scenario.name, None, len(table.starts))
+    motion, floor = table.motion(1), _has_floor(known, scenario, answers)
+    text = proposed_yaml(known.source, motion, scenario.name, None, len(table.starts), floor)
     said = {key: value for key, value in answers.items() if key not in ("points", "scenario")}
     if needs_angle(scenario):
         said.setdefault("ramp_angle_deg", None)
@@ -92,15 +93,22 @@ def _completed(known: Understood, answers: Answers) -> dict[str, Any]:
     kind, other = ("video", "track") if known.is_film else ("track", "video")
     content.pop(other, None)
     content[kind] = known.source.name
-    wanted = {"scenario", "objects", "track_units", "ramp_angle_deg", "pixels_per_metre"}
+    wanted = {"scenario", "objects", "floor", "track_units", "ramp_angle_deg", "pixels_per_metre"}
     wanted |= {"fps", "pixels_per_metre_sd"} & {*answers, *(["fps"] if known.is_film else [])}
     return {key: made[key] for key in wanted & set(made)} | content
+
+
+def _has_floor(known: Understood, scenario: Scenario, answers: Answers) -> bool:
+    likely = known.likely(answers)
+    return likely is not None and likely.bounces and "floor" in scenario.keys
 
 
 def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[str, Any]:
     points, shape = known.points(answers), usual_shape(scenario.name)
     fps = answers.get("fps") or round(known.look.fps or USUAL_FPS, 4)
     content: dict[str, Any] = {"video": known.source.name, "scenario": scenario.name, "fps": fps}
+    if _has_floor(known, scenario, answers):
+        content["floor"] = True
     if needs_angle(scenario):
         content["ramp_angle_deg"] = answers.get("ramp_angle_deg")
     if points and len(points) == 1:

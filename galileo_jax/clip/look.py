@@ -20,8 +20,15 @@ LEVEL_DEG, STEEP_DEG = 2.0, 60.0
 SWINGS = 3
 """Turns back of a motion that swings."""
 
+FEWEST_ON_A_LINE, ENOUGH_PLACES = 4, 200
+"""Places that tell how straight a piece of a path is; of a whole path more are not looked at."""
+
 HALF = 0.5
 """Of its range: what bounces at the end of its way comes back by less each time."""
+
+PER_TURN, STILL, SAME_SIGN = 8, 0.1, 0.7
+"""Places between two turns that show how they are bent; bends smaller by so much are none; which
+share of them has the same sign where something bounces: half do where it swings."""
 
 FALL_M_S2 = (7.0, 12.0)
 """What a fall accelerates with, air and a camera that is not level in it."""
@@ -40,6 +47,7 @@ class Likely:
       is_clear: no other kind of motion looks like it.
       slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
       swings: how often it turns back by more than half of its way, as nothing does that slides.
+      bounces: whether it comes back up from something below, which a yaml calls `floor`.
     """
 
     scenario: str
@@ -47,6 +55,7 @@ class Likely:
     is_clear: bool = False
     slope_deg: float | None = None
     swings: int = 0
+    bounces: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +114,7 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
         unit=table.unit,
         axes=table.axes,
         moved=tuple(float(np.ptp(one[shown])) if shown.any() else 0.0 for one in place),
-        yaml=proposed_yaml(path, table, likely.scenario, fps, count),
+        yaml=proposed_yaml(path, table, likely.scenario, fps, count, likely.bounces),
         warnings=warnings,
     )
 
@@ -151,12 +160,16 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     along = x if np.ptp(x) >= np.ptp(y) else y
     turns = _turns(along)
     straight, degrees = _straight(x, y)
+    if turns >= 2 and straight and degrees > 90 - LEVEL_DEG and _bounces(along, turns):
+        why = "a straight way up and down, thrown back below"
+        return Likely("fall", why, is_clear=True, slope_deg=degrees, bounces=True)
     if turns >= SWINGS:
         kind = "spring" if straight else "pendulum"
         return Likely(kind, f"turns back {turns} times", swings=_turns(along, HALF))
     if not straight:
-        is_thrown = _bends_once(x, y)
-        return Likely("flight", "a path that bends", is_clear=is_thrown)
+        if (ramp := _ramp(x, y)) is not None:
+            return ramp
+        return Likely("flight", "a path that bends", is_clear=_bends_once(x, y))
     if degrees > 90 - LEVEL_DEG:
         return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
     why = f"a straight way at {degrees:.2f} degrees"
@@ -164,6 +177,36 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
         return Likely("level", why, slope_deg=degrees)
     is_slope = degrees < STEEP_DEG
     return Likely("incline", why, is_clear=is_slope, slope_deg=degrees)
+
+
+def _ramp(x: np.ndarray, y: np.ndarray) -> Likely | None:
+    """A slope and then a level; None of a path that is no such two lines, or rather a parabola.
+
+    `x`, `y`: in the order of time.
+    """
+    some = slice(None, None, len(x) // ENOUGH_PLACES + 1)
+    x, y = x[some], y[some]
+    points, size = np.stack([x, y]), float(np.hypot(np.ptp(x), np.ptp(y)))
+    cuts = range(FEWEST_ON_A_LINE, len(x) - FEWEST_ON_A_LINE)
+    bends = [(_off(points[:, :cut]), _off(points[:, cut:])) for cut in cuts]
+    if not bends or np.ptp(x) == 0:
+        return None
+    at = int(np.argmin([np.sum(one**2) + np.sum(other**2) for one, other in bends]))
+    left = np.concatenate(bends[at])
+    thrown = polynomial(x - x.mean(), y, 2).left
+    if np.ptp(left) > STRAIGHT * size or np.sum(left**2) > np.sum(thrown**2):
+        return None
+    slope, level = (_straight(*part)[1] for part in np.split(points, [cuts[at]], axis=1))
+    if not 2 * level < slope < STEEP_DEG:
+        return None
+    why = f"a path that falls by {slope:.0f} degrees and then is level"
+    return Likely("ramp", why, is_clear=True)
+
+
+def _off(points: np.ndarray) -> np.ndarray:
+    """How far places `[2, place]` are from the line through them."""
+    line = line_through(points)
+    return line.across @ points - np.mean(line.across @ points)
 
 
 def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
@@ -188,6 +231,19 @@ def _turns(values: np.ndarray, share: float = 0.1) -> int:
     return turns
 
 
+def _bounces(along: np.ndarray, turns: int) -> bool:
+    """Whether a coordinate at even times turns back gently on one side and suddenly on the other.
+
+    What swings is accelerated one way as long as the other; what bounces is all the time but for
+    blows.
+    """
+    step = max(len(along) // (PER_TURN * turns), 1)
+    moved = along[::step] - along[0]
+    bend = np.diff(moved, 2)
+    bend = bend[np.abs(bend) > STILL * float(np.ptp(along)) / PER_TURN**2]
+    return bool(len(bend) >= SWINGS and abs(np.mean(bend > 0) - HALF) > SAME_SIGN - HALF)
+
+
 def _straight(x: np.ndarray, y: np.ndarray) -> tuple[bool, float]:
     """(whether a path is straight, its angle against the horizontal, degrees)."""
     points = np.stack([x, y])
@@ -204,7 +260,12 @@ def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:
 
 
 def proposed_yaml(
-    path: Path, table: TrackTable, scenario: str, fps: float | None = None, motions: int = 1
+    path: Path,
+    table: TrackTable,
+    scenario: str,
+    fps: float | None = None,
+    motions: int = 1,
+    has_floor: bool = False,
 ) -> str:
     """The clip's yaml; what nobody can know but the user is a comment.
 
@@ -214,12 +275,15 @@ def proposed_yaml(
       scenario: the kind of motion.
       fps: frames per second, where somebody gave them.
       motions: how many follow each other in the file.
+      has_floor: whether the motion is thrown back by one.
     """
     place = table.position[0]
     place = place[:, np.isfinite(place).all(axis=0)]
     lines = [f"track: {path.name}", f"scenario: {scenario}"]
     if motions > 1:
         lines.append(f"trial: 1  # of {motions}: one clip for each")
+    if has_floor:
+        lines.append("floor: true")
     if table.is_in_frames:
         lines.append(f"fps: {fps:g}" if fps else "# fps: of the camera, frames per second")
     if table.unit is None:

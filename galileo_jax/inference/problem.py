@@ -147,10 +147,9 @@ class Problem:
         Errors that follow each other in time, whose size was measured, and what bodies do across
         their path, of which more is allowed for than is there. None where there are neither.
         """
-        seen, count = self.observation, self.observation.num_errors
-        found = [] if self.noise == "tracker" else across_path(seen, self.model.scene.surroundings)
-        if count and seen.modes_m is not None:
-            found = [*found, *seen.modes_m[-count:]]
+        seen, scene = self.observation, self.model.scene.surroundings
+        aside = [] if self.noise == "tracker" else across_path(seen, scene)
+        found = [*aside, *seen.lasting_m]
         if not found:
             return None
         root, basis = self.data.inverse_root, self.data.basis

@@ -95,7 +95,7 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     instant = normal() / (3 * fps)
     late = uniform(0, LATEST_S)
     instant = imperfect * jnp.where(uniform(0, 1) < LATE_SHARE, late, instant)
-    foot = 1.0 + imperfect * foot_transition.SD * normal()
+    foot = 1.0 + imperfect * foot_transition.EDGE_SD * normal()
     rebound = imperfect * impact_restitution.PRIOR.forward(normal())
     zero = jnp.zeros(())
     overlap = imperfect * contact_gap.PRIOR.forward(normal())

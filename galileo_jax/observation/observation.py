@@ -80,6 +80,12 @@ class Observation:
         return self.noise_known_to > 0
 
     @property
+    def lasting_m(self) -> Float[np.ndarray, "mode object axis frame"]:
+        """Those of `modes_m` that are errors which follow each other in time."""
+        modes = np.empty((0, *self.position_m.shape)) if self.modes_m is None else self.modes_m
+        return modes[len(modes) - self.num_errors :]
+
+    @property
     def across(self) -> Float[np.ndarray, "object axis frame"]:
         """Unit vectors along which nothing was measured; 0 where all axes were, or none."""
         found = np.zeros_like(self.position_m)

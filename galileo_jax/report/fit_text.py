@@ -146,7 +146,9 @@ def nearness(error: Mapping[str, Any]) -> list[str]:
     """How near the fit comes to what was seen: in mm, and as a share of the way, where known."""
     units = {"rms_mm": "mm", "rms_percent_of_way": "% of the way"}
     known = {unit: error.get(key) for key, unit in units.items()}  # None in a file, NaN before
-    return [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
+    return [
+        f"{float(f'{size:.2g}'):g} {unit}" for unit, size in known.items() if size and size == size
+    ]
 
 
 def distance(error: Mapping[str, Any]) -> str:

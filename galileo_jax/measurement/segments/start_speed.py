@@ -118,7 +118,10 @@ def _first_half(observation: Observation) -> _Way | None:
     farthest = int(np.argmax(distance))
     along = gone[:, farthest] / distance[farthest]
     covariance = observation.covariance_m2[0][..., seen]
-    sd = np.sqrt(np.einsum("i,ijt,j->t", along, covariance, along))
+    lasting = np.einsum("i,mit->mt", along, observation.lasting_m[:, 0][..., seen])
+    # Of a picture that a coder froze each frame's own error is next to nothing.
+    own = np.einsum("i,ijt,j->t", along, covariance, along)
+    sd = np.sqrt(own + np.sum(lasting**2, axis=0))
     way = along @ gone
     back = int(np.argmin(way[: farthest + 1]))
     sign = -1.0 if way[back] < -CLEAR * math.hypot(sd[0], sd[back]) else 1.0

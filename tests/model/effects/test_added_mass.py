@@ -17,6 +17,7 @@ from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.library.added_mass import PRIOR
 from galileo_jax.model.parameters import LongTailed, absent
+from galileo_jax.rollout.motion import dynamics
 from tests.clip.test_pendulum import angles, closed_form
 
 G, M, SHARE = 9.81, 0.1, 0.08
@@ -132,3 +133,12 @@ def test_more_than_air_is_not_named_something_else(tmp_path, scenario, share):
     assert gx.load(path).objects[0].mass_kg is not None
     verdict = gx.diagnose(path).document["verdict"]
     assert "added_mass" in verdict["effects"], verdict
+
+
+def test_pushes_in_a_flight_are_put_together_for_many_parameters_at_once(tmp_path):
+    model = problem_of(tmp_path, "flight").model
+    theta = {name: np.tile(value, 3) for name, value in zip(
+        model.names, absent(model.parameters), strict=True)}  # fmt: skip
+    law = dynamics(model.effects, model.scene.surroundings, theta, np)
+    for push in law.pushes:
+        assert np.shape(push(np.array([1.0, 2.0]), np.array(0.1)))[-1] == 2

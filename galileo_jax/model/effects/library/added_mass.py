@@ -71,7 +71,7 @@ class AddedMass(Effect, where=_shows_mass):
         upward = (LIFT + 1.0) * theta["added_mass"] * theta["m1"] * scene.gravity
 
         xp = upward.__array_namespace__()
-        lift = upward * xp.asarray([axis == 1 for axis in range(scene.num_axes)])
+        lift = upward[..., None] * xp.asarray([axis == 1 for axis in range(scene.num_axes)])
         return lambda velocity_m_s, time_s: lift
 
     def inertia(self, theta, scene):
