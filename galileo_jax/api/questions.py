@@ -244,7 +244,7 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     table = known.look.table
     is_told = {"rectangle", "pixels_per_metre"} & set(known.declared)
     is_told = is_told or (table is not None and table.calibration is not None)
-    on_surface = scenario is not None and (scenario.has_ramp or scenario.line == "level")
+    on_surface = scenario is not None and scenario.has_surface
     if unit != "px" or is_told or not on_surface or known.has_objects:
         return None
     text = "How many pixels are a metre? Pixels, such as 900 px"

@@ -11,7 +11,7 @@ import numpy as np
 
 from galileo_jax.api.look import Look, look
 from galileo_jax.clip.load import check_clip, yaml_of
-from galileo_jax.clip.look import Likely, Seen, likely_in_plane, usual_shape
+from galileo_jax.clip.look import LEVEL_DEG, Likely, Seen, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS, Scenario
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import MAX_STEP_S
@@ -35,6 +35,7 @@ HOW = {"a ": "along", "one coordinate": "in", "turns": "and", "an angle": "as"}
 
 PICTURE = "what_moves.png"
 USUAL_FPS = 30.0
+NEAR = 0.1  # of its size: what went so far has set out
 RUN = 0.2  # of the longest way between two rests: what goes less far is no motion of its own
 MOST_PICTURES = 6000
 """Of a film in which a motion is looked for: to look at one takes up to 10 ms, and nobody waits for
@@ -50,12 +51,19 @@ class FilmPath:
     """The way that a thing takes through a film, and in which `direction` of the picture.
 
     `likely`: the kind of motion; None where the thing cannot be followed. `way_px`: `[2, place]`,
-    where it is one picture after the other; None: not known.
+    where it is in each of `frames`; None: not known.
     """
 
     likely: Likely | None
     direction: str = "right"
     way_px: np.ndarray | None = None
+    frames: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+    def place(self, frame: int) -> Point:
+        """Where it is in one of `frames`."""
+        assert self.way_px is not None  # of a thing with frames
+        x, y = self.way_px[:, np.searchsorted(self.frames, frame)]
+        return float(x), float(y)
 
     @property
     def moved_px(self) -> float:
@@ -76,7 +84,7 @@ class Understood:
       first_frames: in which of these are first seen that come later.
       foot: of a ramp that such a film shows, px; None: it shows none.
       unseen: why no moving thing was found in such a film; "" where one was.
-      is_pair: one thing sets out after the other, as on a ramp into another.
+      is_pair: one thing runs into the other, which sets out then.
     """
 
     source: Path
@@ -128,7 +136,16 @@ class Understood:
         points = self.points(answers)
         if len(points) == 1:
             return self.path(points[0]).likely
-        return Likely("ramp", "two things move, one after the other") if points else None
+        return self._likely_of_pair(points[1]) if points else None
+
+    def _likely_of_pair(self, struck: Point) -> Likely:
+        """Of two things that meet; `struck`: the one that is run into."""
+        why = "two things move, one after the other"
+        path = None if self.foot is not None else self.path(struck)
+        slope = path.likely.slope_deg if path is not None and path.likely is not None else None
+        if slope is None or slope <= LEVEL_DEG:
+            return Likely("ramp", why)
+        return Likely("from_above", f"{why}, and what is struck goes off at {slope:.0f} degrees")
 
     def scenario(self, answers: Answers) -> Scenario | None:
         """The kind of motion: as declared, as answered, as it seems; None: nobody knows."""
@@ -234,13 +251,31 @@ def _with_things(known: Understood) -> Understood:
         return replace(known, unseen=why.removesuffix("; mark the objects by hand"))
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
     is_ramp = proposal.scenario == "ramp"
-    return replace(
+    known = replace(
         known,
         things=things,
         first_frames={proposal.objects[name]: at for name, at in proposal.first_frames.items()},
         foot=proposal.foot if is_ramp else None,
-        is_pair=is_ramp and len(things) > 1 and not proposal.doubts,
     )
+    is_on_ramp = is_ramp and len(things) > 1 and not proposal.doubts
+    return replace(known, is_pair=is_on_ramp or _meet(known))
+
+
+def _meet(known: Understood) -> bool:
+    """Whether the second thing sets out when the first is beside it."""
+    if len(known.things) < 2:
+        return False
+    (runs, size), (struck, other_size), *_ = known.things.items()
+    first, second = known.path(runs), known.path(struck)
+    if first.way_px is None or second.way_px is None:
+        return False
+    away = np.hypot(*(second.way_px - second.way_px[:, :1])) > NEAR * max(other_size)
+    both = np.intersect1d(first.frames, second.frames[away])
+    if not both.size:
+        return False
+    one, other = (path.place(int(both[0])) for path in (first, second))
+    moved = math.dist(one, first.place(int(first.frames[0]))) > max(size)
+    return moved and math.dist(one, other) < max(size) + max(other_size)
 
 
 def _followed(known: Understood, point: Point) -> FilmPath:
@@ -262,7 +297,7 @@ def _followed(known: Understood, point: Point) -> FilmPath:
     path = PointPath(seen, track.times_s[seen], track.position_px[0][seen].T, variance)
     x = path.place_m[0]
     direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
-    return FilmPath(_likely_between_rests(path), direction, path.place_m)
+    return FilmPath(_likely_between_rests(path), direction, path.place_m, path.frames)
 
 
 def _likely_between_rests(path: PointPath) -> Likely:
@@ -302,8 +337,8 @@ def _of_film(known: Understood, answers: Answers) -> str:
     if not points:
         return f"No moving thing was found: {known.unseen}."
     things = "One thing moves" if len(known.things) < 2 else f"{len(known.things)} things move"
-    if len(points) > 1:
-        return f"{things}, one after the other: it looks like {_kind('ramp')}."
+    if len(points) > 1 and (likely := known.likely(answers)) is not None:
+        return f"{things}, one after the other: it looks like {_kind(likely.scenario)}."
     path = known.path(points[0])
     if path.likely is None:
         return f"{things}, but cannot be followed."

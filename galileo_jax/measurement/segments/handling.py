@@ -86,14 +86,14 @@ def hand_frame(observation: Observation) -> int | None:
     return int(path.frames[starts[is_held][-1] + size]) if is_held.any() else None
 
 
-def pushed_frame(observation: Observation) -> int | None:
+def pushed_frame(observation: Observation, index: int = 0) -> int | None:
     """The first frame after a push on a level table; None where nothing pushes it at first.
 
     It gains speed, by `CLEAR` standard deviations of its acceleration in a window and by `HELD` of
     what friction slows it down by, within the first half of its way only: what gains speed for
     longer is pulled by something of the scene.
     """
-    path = observation.path()
+    path = observation.path(index)
     if len(path) < 4 * FEWEST:
         return None
     gone, length = _gone(path.place_m)
@@ -105,7 +105,7 @@ def pushed_frame(observation: Observation) -> int | None:
     slows = -float(np.median(found[on_way])) if on_way.any() else 0.0
     # What rests before the push and after the way scatters by less than what moves.
     gains = np.flatnonzero(found > max(CLEAR * sd, HELD * slows))
-    if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
+    if not gains.size or middle[gains[-1]] > PUSHED_WAY:
         return None
     return int(path.frames[min(gains[-1] + size, len(path) - 1)])
 

@@ -14,8 +14,10 @@ what is no more the object that was marked is `Astray`.
     pendulum, spring, liquid from where it is let go, to a blow or a stop
     ramp                     to where a box tips over, two that touch turn aside, or object 1 comes
                              back to the foot
-    from_above               to a blow where neither another puck nor a declared wall is, or to a
-                             quarter of a second after everything has come to rest
+    from_above               from where the first that moves gains no more speed, if it does so
+                             before all others move; to a blow where neither another puck nor a
+                             declared wall is, or to a quarter of a second after everything has
+                             come to rest
 """
 
 from collections.abc import Sequence
@@ -121,7 +123,8 @@ def segment(clip: Clip, observation: Observation, track: Track | None = None) ->
     """The segments of a track; of one made elsewhere (`track` None) nothing has gone astray."""
     scenario, whole = SCENARIOS[clip.scenario], _Kept(observation)
     if scenario.is_level:
-        kept = whole.end_with(_end_of_pucks(clip, observation))
+        whole = whole.begin_at(*_pushed_puck(observation))
+        kept = whole.end_with(_end_of_pucks(clip, whole.observation))
     elif scenario.has_table:
         kept = whole.end_with(ramp_end(clip, observation))
     else:
@@ -138,11 +141,11 @@ class _Kept:
     begin: Cut | None = None
     end: Cut | None = None
 
-    def begin_at(self, frame: int | None, why: str) -> "_Kept":
-        """Without what is before a frame; None: nothing is left out."""
+    def begin_at(self, frame: int | None, why: str, i: int = 0) -> "_Kept":
+        """Without what is before a frame that object `i` tells; None: nothing is left out."""
         if frame is None:
             return self
-        cut = Cut(self.observation.names[0], float(self.observation.times_s[frame]), "before", why)
+        cut = Cut(self.observation.names[i], float(self.observation.times_s[frame]), "before", why)
         return replace(self, observation=self.observation.without(slice(frame)), begin=cut)
 
     def end_with(self, found: tuple[int, int, str] | None) -> "_Kept":
@@ -202,6 +205,19 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int, int, str] | 
     if why == STOPPED and blow.goes_on(observation, last):
         why = STRUCK
     return last - (EXPOSED_FRAMES if observation.is_tracked_here else 0), 0, why
+
+
+def _pushed_puck(observation: Observation) -> tuple[int | None, str, int]:
+    """The first frame after a push of what moves first, why, and which; no frame: none is pushed.
+
+    As long as nothing else moves: what is struck gains speed, too.
+    """
+    count = observation.mask.shape[1]
+    away = [observation.first_away(i) for i in range(len(observation.names))]
+    moves = [count if frame is None else frame for frame in away]
+    first, *later = np.argsort(moves, kind="stable")
+    alone = observation.without(slice(moves[later[0]] if later else count, None))
+    return handling.pushed_frame(alone, int(first)), PUSHED, int(first)
 
 
 def _end_of_pucks(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
