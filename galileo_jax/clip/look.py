@@ -160,7 +160,7 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     along = x if np.ptp(x) >= np.ptp(y) else y
     turns = _turns(along)
     straight, degrees = _straight(x, y)
-    if turns >= 2 and straight and degrees > 90 - LEVEL_DEG and _bounces(along, turns):
+    if straight and degrees > 90 - LEVEL_DEG and _bounces(along):
         why = "a straight way up and down, thrown back below"
         return Likely("fall", why, is_clear=True, slope_deg=degrees, bounces=True)
     if turns >= SWINGS:
@@ -219,26 +219,36 @@ def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
 
 def _turns(values: np.ndarray, share: float = 0.1) -> int:
     """How often a coordinate turns back, by more than a share of its range."""
+    return len(_turning(values, share))
+
+
+def _turning(values: np.ndarray, share: float = 0.1) -> list[int]:
+    """Where a coordinate turns back, by more than a share of its range."""
     least = share * float(np.ptp(values))
-    turns, extreme, direction = 0, values[0], 0
-    for value in values:
-        if direction == 0 and abs(value - extreme) > least:
-            direction, extreme = (1 if value > extreme else -1), value
-        elif direction and (value - extreme) * direction > 0:
-            extreme = value
-        elif direction and (extreme - value) * direction > least:
-            turns, direction, extreme = turns + 1, -direction, value
+    turns, last, direction = [], 0, 0
+    for i, value in enumerate(values):
+        beyond = value - values[last]
+        if direction == 0 and abs(beyond) > least:
+            direction, last = (1 if beyond > 0 else -1), i
+        elif direction and beyond * direction > 0:
+            last = i
+        elif direction and -beyond * direction > least:
+            turns.append(last)
+            direction, last = -direction, i
     return turns
 
 
-def _bounces(along: np.ndarray, turns: int) -> bool:
+def _bounces(along: np.ndarray) -> bool:
     """Whether a coordinate at even times turns back gently on one side and suddenly on the other.
 
     What swings is accelerated one way as long as the other; what bounces is all the time but for
     blows.
     """
-    step = max(len(along) // (PER_TURN * turns), 1)
-    moved = along[::step] - along[0]
+    turns = _turning(along)
+    if len(turns) < 2:
+        return False
+    between = (turns[-1] - turns[0]) / (len(turns) - 1)
+    moved = along[: turns[-1] + round(between) : max(round(between / PER_TURN), 1)]
     bend = np.diff(moved, 2)
     bend = bend[np.abs(bend) > STILL * float(np.ptp(along)) / PER_TURN**2]
     return bool(len(bend) >= SWINGS and abs(np.mean(bend > 0) - HALF) > SAME_SIGN - HALF)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
+import galileo_jax as gx
 from galileo_jax.__main__ import main
 from galileo_jax.api.look import look
 from galileo_jax.clip.look import likely_in_plane
@@ -72,3 +73,51 @@ def test_a_level_way_in_a_picture_is_no_slope():
     x = np.linspace(60.0, 900.0, 40)
     found = likely_in_plane(x, 400 + 0.002 * x)
     assert (found.scenario, found.is_clear) == ("level", False)
+
+
+FILM_T = np.arange(60) / 60
+
+
+def noisy(values: np.ndarray, seed: int) -> np.ndarray:
+    return values + 0.3 * np.random.default_rng(seed).standard_normal(values.shape)  # px
+
+
+@pytest.mark.parametrize("degrees", [10, 20, 30, 45])
+def test_a_slope_and_then_a_level_is_a_ramp_with_a_table(degrees):
+    way, on_ramp = 1200 * FILM_T**2, 500.0
+    past, angle = np.clip(way - on_ramp, 0, None), np.radians(degrees)
+    x = np.minimum(way, on_ramp) * np.cos(angle) + past
+    y = np.minimum(way, on_ramp) * np.sin(angle)
+    found = likely_in_plane(noisy(x, 1), noisy(y, 2))
+    assert (found.scenario, found.is_clear) == ("ramp", True)
+
+
+@pytest.mark.parametrize("up_px_s", [0.0, 300.0, 900.0])
+def test_what_is_thrown_is_no_ramp_however_flat_it_ends(up_px_s):
+    y = -up_px_s * FILM_T + 2000 * FILM_T**2
+    found = likely_in_plane(noisy(700 * FILM_T, 1), noisy(y, 2))
+    assert (found.scenario, found.is_clear) == ("flight", True)
+
+
+@pytest.mark.parametrize("down", [1.0, -1.0])
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_what_bounces_is_thrown_back_and_what_swings_is_not(share, down):
+    height, speed, seen = 300.0, 0.0, []
+    for _ in range(240):
+        seen.append(height)
+        for _ in range(20):
+            speed -= 3000 / 1200
+            height += speed / 1200
+            if height < 0 > speed:
+                speed *= -share
+    bouncing = likely_in_plane(noisy(np.zeros(240), 1), down * noisy(np.array(seen), 2))
+    assert (bouncing.scenario, bouncing.bounces, bouncing.is_clear) == ("fall", True, True)
+    swinging = 150 * np.cos(np.arange(240) / 9) * np.exp(-np.arange(240) / 300)
+    found = likely_in_plane(noisy(np.zeros(240), 1), noisy(swinging, 2))
+    assert (found.scenario, found.bounces) == ("spring", False)
+
+
+def test_the_yaml_of_what_bounces_has_a_floor(tmp_path: Path) -> None:
+    gx.simulate(tmp_path / "made.csv", scenario="fall", floor=True, seed=2, track_only=True)
+    (tmp_path / "made.csv").rename(tmp_path / "ball.csv")
+    assert "floor: true" in look(tmp_path / "ball.csv").seen.yaml

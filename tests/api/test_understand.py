@@ -225,6 +225,24 @@ def test_of_two_things_a_person_chooses(tmp_path):
 
 
 @pytest.mark.video
+def test_two_things_that_meet_are_followed_together(tmp_path):
+    """From above: what is struck beside its middle goes off at an angle."""
+    time = np.arange(40.0)
+    first = 5.0 * np.clip(time - 3, 0, 16) + 1.0 * np.clip(time - 19, 0, 8)
+    second = 4.0 * np.clip(time - 19, 0, 12)
+    path = filmed(
+        tmp_path,
+        np.stack([30 + first, 60 + 0 * time, 0 * time], axis=1),
+        np.stack([142 + second, 66 + 0.6 * second, 0 * time], axis=1),
+    )
+    known = understand(path)
+    asked = {one.key: one for one in questions(known, {})}
+    assert asked["points"].default == "both"
+    assert asked["scenario"].default == "from_above"
+    assert asked["pixels_per_metre"].is_open, "friction cannot be told without"
+
+
+@pytest.mark.video
 def test_of_a_hand_and_what_it_lets_go_the_latter_is_the_default(tmp_path):
     """The hand moves first, to and fro; the other thing goes down a slope."""
     time = np.arange(40.0)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from galileo_jax.clip.load import load_clip
+from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.handling import let_go_frame, pushed_frame, thrown_frame
 from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
@@ -138,3 +140,28 @@ def test_a_push_shows_between_two_rests() -> None:
     found = replace(found, covariance_m2=found.covariance_m2 * smaller)
     first = pushed_frame(found)
     assert first is not None and at_s[1] < times[first] < at_s[1] + 0.2
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_puck_that_is_pushed_is_free_before_it_hits_another(tmp_path, order) -> None:
+    """From .3 to .55 s a hand speeds it up; at .8 s it strikes the other, which gains speed."""
+    times, slows = np.arange(90) / 60, 2.0
+    push, free = np.clip(times - 0.3, 0, 0.25), np.clip(times - 0.55, 0, 0.25)
+    way = 5.2 * push**2 / 2 + 1.3 * free - slows * free**2 / 2
+    after = np.clip(times - 0.8, 0, 0.2)
+    struck = 0.8 * after - slows * after**2
+    one = np.stack([way + 0.1 * after, 0 * way])
+    other = np.stack([0.5 + struck, 0.02 + 0.5 * struck])
+    place = np.stack([one, other])[list(order)]
+    path = tmp_path / "pucks.yaml"
+    path.write_text(
+        "track: pucks.csv\nscenario: from_above\nobjects:\n"
+        + "".join(f"- {{name: o{i}, shape: cylinder, size_m: [0.03, 0.02]}}\n" for i in (1, 2))
+    )
+    rows = noisy(times, place, 1e-4).position_m.reshape(4, -1)
+    titles = "time_s,o1_x_m,o1_y_m,o2_x_m,o2_y_m"
+    table = np.column_stack([times, *rows])
+    np.savetxt(tmp_path / "pucks.csv", table, delimiter=",", header=titles, comments="")
+    begin = next(cut for cut in measure(load_clip(path)).cuts if cut.side == "before")
+    assert "pushed by a hand" in begin.why and 0.55 <= begin.time_s < 0.66
+    assert begin.name == f"o{1 + order.index(0)}"

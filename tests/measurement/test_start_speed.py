@@ -1,5 +1,6 @@
 """Whether an object moves already when it is first seen, and how fast."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from galileo_jax.api.fit import fit
 from galileo_jax.assembly.build_problem import make_problem
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
-from galileo_jax.measurement.segments.start_speed import start_speed
+from galileo_jax.measurement.segments.start_speed import rest_s, start_speed
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
 
@@ -103,3 +104,18 @@ def test_no_data_lie_behind_a_rollout(tmp_path):
     model = make_problem(measured.clip, measured.observation).model
     release_s, sd_s = model.scene.surroundings.release_s
     assert model.duration_s >= measured.observation.times_s[-1] - (release_s - 5 * sd_s)
+
+
+@pytest.mark.parametrize("rests", [0.2, 0.6])
+def test_a_picture_that_a_coder_froze_does_not_hide_a_rest(rests):
+    """Its own errors are next to nothing, and one that many frames share moves it by more."""
+    seen_way = went(way(rests, count=120))
+    frozen = round(rests * FPS)
+    place, covariance = seen_way.position_m.copy(), seen_way.covariance_m2.copy()
+    place[..., :frozen] = place[..., :1] + 0.1 * NOISE_M * (np.arange(frozen) > 3) * -DOWN[:, None]
+    covariance[..., :frozen] *= 1e-6
+    lasting = np.zeros((1, *place.shape))
+    lasting[0, 0, :, 4:frozen] = 0.1 * NOISE_M * DOWN[:, None]
+    seen_way = replace(seen_way, position_m=place, covariance_m2=covariance)
+    found = rest_s(seen_way.with_modes([], [*lasting]))
+    assert found is not None and abs(found - rests) < 0.05

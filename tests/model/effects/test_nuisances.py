@@ -72,6 +72,16 @@ def test_foot_transition_is_the_factor_at_the_foot():
     assert FootTransition().parameters(still) == (), "nothing comes down"
 
 
+@pytest.mark.parametrize("degrees", [5.0, 15.0, 30.0])
+def test_a_foot_that_takes_no_speed_is_not_out_of_the_question(degrees):
+    """Of a body with half the friction that would hold it on the ramp."""
+    angle = np.radians(degrees)
+    (factor,) = FootTransition().parameters(replace(RAMP, angle_rad=angle))
+    keeps_all = 1 / (np.cos(angle) - 0.5 * np.tan(angle) * np.sin(angle))
+    assert 0.05 <= factor.prior.sd < 0.25
+    assert keeps_all - 1 <= 2 * factor.prior.sd
+
+
 def test_start_offset_is_along_the_path():
     theta = absent_theta(
         StartOffset(), RAMP, start_offset_object1=0.004, start_offset_object2=-0.002
