@@ -120,4 +120,5 @@ def test_what_bounces_is_thrown_back_and_what_swings_is_not(share, down):
 def test_the_yaml_of_what_bounces_has_a_floor(tmp_path: Path) -> None:
     gx.simulate(tmp_path / "made.csv", scenario="fall", floor=True, seed=2, track_only=True)
     (tmp_path / "made.csv").rename(tmp_path / "ball.csv")
-    assert "floor: true" in look(tmp_path / "ball.csv").seen.yaml
+    seen = look(tmp_path / "ball.csv").seen
+    assert seen is not None and "floor: true" in seen.yaml

@@ -114,8 +114,8 @@ def test_a_picture_that_a_coder_froze_does_not_hide_a_rest(rests):
     place, covariance = seen_way.position_m.copy(), seen_way.covariance_m2.copy()
     place[..., :frozen] = place[..., :1] + 0.1 * NOISE_M * (np.arange(frozen) > 3) * -DOWN[:, None]
     covariance[..., :frozen] *= 1e-6
-    lasting = np.zeros((1, *place.shape))
-    lasting[0, 0, :, 4:frozen] = 0.1 * NOISE_M * DOWN[:, None]
+    lasting = np.zeros(place.shape)
+    lasting[0, :, 4:frozen] = 0.1 * NOISE_M * DOWN[:, None]
     seen_way = replace(seen_way, position_m=place, covariance_m2=covariance)
-    found = rest_s(seen_way.with_modes([], [*lasting]))
+    found = rest_s(seen_way.with_modes([], [lasting]))
     assert found is not None and abs(found - rests) < 0.05

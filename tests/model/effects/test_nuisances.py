@@ -13,6 +13,7 @@ from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.model.effects.nuisances.start_offset import StartOffset
+from galileo_jax.model.parameters import Normal
 from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from tests.ramp_model import HIT, make_surroundings
 
@@ -78,6 +79,7 @@ def test_a_foot_that_takes_no_speed_is_not_out_of_the_question(degrees):
     angle = np.radians(degrees)
     (factor,) = FootTransition().parameters(replace(RAMP, angle_rad=angle))
     keeps_all = 1 / (np.cos(angle) - 0.5 * np.tan(angle) * np.sin(angle))
+    assert isinstance(factor.prior, Normal)
     assert 0.05 <= factor.prior.sd < 0.25
     assert keeps_all - 1 <= 2 * factor.prior.sd
 
