@@ -165,3 +165,11 @@ def test_a_puck_that_is_pushed_is_free_before_it_hits_another(tmp_path, order) -
     begin = next(cut for cut in measure(load_clip(path)).cuts if cut.side == "before")
     assert "pushed by a hand" in begin.why and 0.55 <= begin.time_s < 0.66
     assert begin.name == f"o{1 + order.index(0)}"
+
+
+@pytest.mark.parametrize("hit_s", [0.3, 0.305, 0.31])
+def test_what_a_wall_throws_back_past_its_start_was_not_pushed(hit_s: float) -> None:
+    times, slows = np.arange(90) / 60, 0.3
+    there, back = np.minimum(times, hit_s), np.clip(times - hit_s, 0, None)
+    way = -1.0 * there + slows * there**2 / 2 + 0.8 * back - slows * back**2 / 2
+    assert pushed_frame(noisy(times, np.stack([way, 0 * way]), noise_m=2e-4)) is None

@@ -104,7 +104,11 @@ def pushed_frame(observation: Observation, index: int = 0) -> int | None:
     on_way = (middle > WAY[0]) & (middle < WAY[1])
     slows = -float(np.median(found[on_way])) if on_way.any() else 0.0
     # What rests before the push and after the way scatters by less than what moves.
-    gains = np.flatnonzero(found > max(CLEAR * sd, HELD * slows))
+    # What is thrown back goes backwards first, and gains speed within a single step.
+    forward = gone[starts + 1] - gone[starts] > -CLEAR * np.sqrt(2 * np.median(path.variance_m2))
+    is_gain = (found > max(CLEAR * sd, HELD * slows)) & forward
+    around = np.pad(is_gain, 1)
+    gains = np.flatnonzero(is_gain & (around[:-2] | around[2:]))
     if not gains.size or middle[gains[-1]] > PUSHED_WAY:
         return None
     return int(path.frames[min(gains[-1] + size, len(path) - 1)])
