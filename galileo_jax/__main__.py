@@ -56,7 +56,8 @@ def main(argv: Sequence[str]) -> int | None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if verb not in dict(VERBS):
         explain = import_module(f"galileo_jax.commands.{EXPLAIN}")
-        if explain.looks_like_a_file(verb):
+        is_option_first = verb.startswith("--") and any(map(explain.looks_like_a_file, rest))
+        if explain.looks_like_a_file(verb) or is_option_first:
             return explain.main(argv)
         hint = did_you_mean(verb, dict(VERBS)) or ";"
         raise InputError(f"unknown verb {verb!r}{hint} {_known()}")

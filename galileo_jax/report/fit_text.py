@@ -25,7 +25,7 @@ MEANINGS = {  # by name; of those with a number in them, by pattern
     "start_velocity_x": "velocity in the first frame, along the travel",
     "start_velocity_y": "velocity in the first frame, upward",
     "start_speed": "speed in the first frame",
-    "start_angle": "direction of the throw, above the horizontal",
+    "start_angle": "angle at the start (a throw: above the level; a thread: from the plumb line)",
     "floor_restitution": "share of the speed left after a bounce",
     "floor_height": "height of the centre at a bounce",
     "floor_grip": "share of the speed along the floor that is lost in a bounce",

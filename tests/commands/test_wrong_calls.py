@@ -26,6 +26,8 @@ WRONG = [
     ("fit clip.yaml --method mh --selection best", "--selection: of --preset thesis only"),
     ("fit clip.yaml --motion free --engine mjx", "--engine mjx: it moves objects in a plane"),
     ("fit clip.yaml --motion free --method cnn", "--method cnn: the network knows motion in a"),
+    ("--seed x gone.mp4", "'x' is not a whole number"),
+    ("--scenario ramp gone.mp4", "gone.mp4: no such file"),
     ("compare clip.yaml --effects nonsense", "'nonsense'"),
     ("compare clip.yaml --effects-from missing.py", "missing.py: no such file"),
     ("compare clip.yaml folder", "a run is compared alone"),
