@@ -99,8 +99,8 @@ def _completed(known: Understood, answers: Answers) -> dict[str, Any]:
 
 
 def _has_floor(known: Understood, scenario: Scenario, answers: Answers) -> bool:
-    likely = known.likely(answers)
-    return likely is not None and likely.bounces and "floor" in scenario.keys
+    likely = known.likely(answers) if "floor" in scenario.keys else None
+    return likely is not None and likely.bounces
 
 
 def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,7 @@ class Understood:
       first_frames: in which of these are first seen that come later.
       foot: of a ramp that such a film shows, px; None: it shows none.
       unseen: why no moving thing was found in such a film; "" where one was.
-      is_pair: one thing runs into the other, which sets out then.
+      is_on_ramp: its first look shows two things on a ramp, one after the other.
     """
 
     source: Path
@@ -94,9 +95,14 @@ class Understood:
     things: Mapping[Point, Point] = field(default_factory=dict)
     first_frames: Mapping[Point, int] = field(default_factory=dict)
     foot: Point | None = None
-    is_pair: bool = False
+    is_on_ramp: bool = False
     unseen: str = ""
     _paths: dict[Point, FilmPath] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def is_pair(self) -> bool:
+        """Whether one thing runs into another, which sets out then."""
+        return self.is_on_ramp or _meet(self)
 
     @property
     def is_film(self) -> bool:
@@ -251,14 +257,13 @@ def _with_things(known: Understood) -> Understood:
         return replace(known, unseen=why.removesuffix("; mark the objects by hand"))
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
     is_ramp = proposal.scenario == "ramp"
-    known = replace(
+    return replace(
         known,
         things=things,
         first_frames={proposal.objects[name]: at for name, at in proposal.first_frames.items()},
         foot=proposal.foot if is_ramp else None,
+        is_on_ramp=is_ramp and len(things) > 1 and not proposal.doubts,
     )
-    is_on_ramp = is_ramp and len(things) > 1 and not proposal.doubts
-    return replace(known, is_pair=is_on_ramp or _meet(known))
 
 
 def _meet(known: Understood) -> bool:

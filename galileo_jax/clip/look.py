@@ -8,7 +8,7 @@ import numpy as np
 
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.track_axes import accelerations
-from galileo_jax.numerics.least_squares import line_through, polynomial
+from galileo_jax.numerics.least_squares import line_through, polynomial, two_lines
 from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
 STRAIGHT = 0.03
@@ -187,26 +187,21 @@ def _ramp(x: np.ndarray, y: np.ndarray) -> Likely | None:
     some = slice(None, None, len(x) // ENOUGH_PLACES + 1)
     x, y = x[some], y[some]
     points, size = np.stack([x, y]), float(np.hypot(np.ptp(x), np.ptp(y)))
-    cuts = range(FEWEST_ON_A_LINE, len(x) - FEWEST_ON_A_LINE)
-    bends = [(_off(points[:, :cut]), _off(points[:, cut:])) for cut in cuts]
-    if not bends or np.ptp(x) == 0:
+    found = two_lines(points, FEWEST_ON_A_LINE)
+    if found is None or np.ptp(x) == 0:
         return None
-    at = int(np.argmin([np.sum(one**2) + np.sum(other**2) for one, other in bends]))
-    left = np.concatenate(bends[at])
+    *lines, at = found
+    parts = np.split(points, [at], axis=1)
+    each = zip(lines, parts, strict=True)
+    left = np.concatenate([one.across @ (part - one.middle[:, None]) for one, part in each])
     thrown = polynomial(x - x.mean(), y, 2).left
     if np.ptp(left) > STRAIGHT * size or np.sum(left**2) > np.sum(thrown**2):
         return None
-    slope, level = (_straight(*part)[1] for part in np.split(points, [cuts[at]], axis=1))
+    slope, level = (_straight(*part)[1] for part in parts)
     if not 2 * level < slope < STEEP_DEG:
         return None
     why = f"a path that falls by {slope:.0f} degrees and then is level"
     return Likely("ramp", why, is_clear=True)
-
-
-def _off(points: np.ndarray) -> np.ndarray:
-    """How far places `[2, place]` are from the line through them."""
-    line = line_through(points)
-    return line.across @ points - np.mean(line.across @ points)
 
 
 def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:

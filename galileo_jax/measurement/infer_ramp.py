@@ -20,7 +20,7 @@ import numpy as np
 from galileo_jax.clip.fields import MAX_ANGLE_SD_DEG, MAX_SIZE_M, MIN_RAMP_ANGLE_DEG, MIN_SIZE_M
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.numerics.least_squares import Line, line_through
+from galileo_jax.numerics.least_squares import Line, line_through, two_lines
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -135,12 +135,7 @@ def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
             f"the path shows the ramp only together with its height; {remedy}"
         )
     points = observation.position_m[0][:, observation.mask[0]]
-    count = points.shape[1]
-    splits = [
-        (line_through(points[:, :at]), line_through(points[:, at:]), at)
-        for at in range(MIN_POINTS, count - MIN_POINTS + 1)
-    ]
-    best = min(splits, key=lambda one: one[0].spread[0] + one[1].spread[0], default=None)
+    best = two_lines(points, MIN_POINTS)
     if best is None or not falls_deg(best[0]) - falls_deg(best[1]) >= MIN_BEND_DEG:
         raise InputError(
             f"{clip.path}: origin_px: null, and {first.name}'s path does not bend: the foot of the "

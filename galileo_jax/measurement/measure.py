@@ -143,9 +143,7 @@ def measure(clip: Clip) -> Measurement:
     if needs_slope:
         clip = _inclined(clip, whole, told)
     else:
-        # A spring works along any line: its load's weight shifts the place of rest alone.
-        may_turn = not whole.is_tracked_here or "spring" in scenario.laws
-        way = other_way(clip, segment(clip, whole).used(whole), may_turn)
+        way = other_way(clip, segment(clip, whole).used(whole))
         whole = turned_back(clip, whole, way) if way and way.is_turned_back else whole
     if scenario.is_level:
         clip, whole = _with_pucks(clip, whole, pixels, told)

@@ -42,10 +42,11 @@ class OtherWay:
     is_turned_back: bool
 
 
-def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay | None:
+def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     """What the path of object 1 says against the declared way; None where they agree.
 
-    The axes of a table `may_turn`.
+    The axes of a table may be turned. A spring works along any line: its load's weight shifts the
+    place of rest alone.
     """
     scenario = SCENARIOS[clip.scenario]
     declared = clip.ramp_angle_deg if scenario.has_ramp else 90.0
@@ -61,7 +62,9 @@ def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay 
     scatter = max(line.spread[0] / (points.shape[1] - 2), noise)
     sd = math.degrees(math.sqrt(scatter / line.spread[1]))
     path = falls_deg(line)
-    period = 180.0 if "spring" in scenario.laws else 360.0  # what goes to and fro has no end
+    is_spring = "spring" in scenario.laws
+    may_turn = is_spring or not observation.is_tracked_here
+    period = 180.0 if is_spring else 360.0  # what goes to and fro has no end
     apart = abs((declared - path + period / 2) % period - period / 2)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
     if may_turn and apart > NEARER * max(off_axis, sd):

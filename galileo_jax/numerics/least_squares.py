@@ -80,6 +80,18 @@ def line_through(points: Float[np.ndarray, "2 point"]) -> Line:
     return Line(middle, along, axes[:, 0], (max(float(values[0]), 0.0), float(values[1])))
 
 
+def two_lines(points: Float[np.ndarray, "2 point"], fewest: int) -> tuple[Line, Line, int] | None:
+    """The two lines through the first points and the others, and how many are on the first.
+
+    Of least summed squares across; None where there are not `fewest` points for either.
+    """
+    splits = (
+        (line_through(points[:, :at]), line_through(points[:, at:]), at)
+        for at in range(fewest, points.shape[1] - fewest + 1)
+    )
+    return min(splits, key=lambda one: one[0].spread[0] + one[1].spread[0], default=None)
+
+
 def circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
     """The circle through points `[frame]` by linear least squares: its centre and radius.
 

@@ -166,6 +166,11 @@ def filmed(folder: Path, *paths: np.ndarray) -> Path:
     return written(folder, film([(Box(seed=4 * n), path) for n, path in enumerate(paths)]))
 
 
+def upright(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A path `[frame, 3]` of what does not turn; either may be one number for all frames."""
+    return np.stack([x + 0 * y, y + 0 * x, 0 * (x + y)], axis=1)
+
+
 def written(folder: Path, frames: list[np.ndarray]) -> Path:
     video = folder / "clip.mp4"
     size = frames[0].shape[1::-1]
@@ -205,8 +210,8 @@ def test_of_two_things_a_person_chooses(tmp_path):
     second = 3.0 * np.clip(time - 12, 0, 12)
     path = filmed(
         tmp_path,
-        np.stack([40 + first, 40 + 0 * time, 0 * time], axis=1),
-        np.stack([150 + second, 90 + 0 * time, 0 * time], axis=1),
+        upright(40 + first, np.array(40)),
+        upright(150 + second, np.array(90)),
     )
     known = understand(path)
     assert len(known.things) == 2
@@ -230,11 +235,8 @@ def test_two_things_that_meet_are_followed_together(tmp_path):
     time = np.arange(40.0)
     first = 5.0 * np.clip(time - 3, 0, 16) + 1.0 * np.clip(time - 19, 0, 8)
     second = 4.0 * np.clip(time - 19, 0, 12)
-    path = filmed(
-        tmp_path,
-        np.stack([30 + first, 60 + 0 * time, 0 * time], axis=1),
-        np.stack([142 + second, 66 + 0.6 * second, 0 * time], axis=1),
-    )
+    struck = upright(142 + second, 66 + 0.6 * second)
+    path = filmed(tmp_path, upright(30 + first, np.array(60)), struck)
     known = understand(path)
     asked = {one.key: one for one in questions(known, {})}
     assert asked["points"].default == "both"
@@ -249,8 +251,8 @@ def test_of_a_hand_and_what_it_lets_go_the_latter_is_the_default(tmp_path):
     hand, run = np.clip(time - 2, 0, 24), 4.0 * np.clip(time - 8, 0, 20)
     path = filmed(
         tmp_path,
-        np.stack([150 + 12 * np.sin(hand / 2), 30 + 8 * np.cos(hand / 3), 0 * time], axis=1),
-        np.stack([50 + run, 60 + 0.5 * run, 0 * time], axis=1),
+        upright(150 + 12 * np.sin(hand / 2), 30 + 8 * np.cos(hand / 3)),
+        upright(50 + run, 60 + 0.5 * run),
     )
     known = understand(path)
     assert len(known.things) == 2 and known.likeliest is not None

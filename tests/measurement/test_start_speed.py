@@ -109,13 +109,14 @@ def test_no_data_lie_behind_a_rollout(tmp_path):
 @pytest.mark.parametrize("rests", [0.2, 0.6])
 def test_a_picture_that_a_coder_froze_does_not_hide_a_rest(rests):
     """Its own errors are next to nothing, and one that many frames share moves it by more."""
+    off_m = 4 * NOISE_M  # more than the frames after the rest scatter
     seen_way = went(way(rests, count=120))
     frozen = round(rests * FPS)
     place, covariance = seen_way.position_m.copy(), seen_way.covariance_m2.copy()
-    place[..., :frozen] = place[..., :1] + 0.1 * NOISE_M * (np.arange(frozen) > 3) * -DOWN[:, None]
+    place[..., :frozen] = place[..., :1] - off_m * (np.arange(frozen) > 3) * DOWN[:, None]
     covariance[..., :frozen] *= 1e-6
     lasting = np.zeros(place.shape)
-    lasting[0, :, 4:frozen] = 0.1 * NOISE_M * DOWN[:, None]
+    lasting[0, :, 4:frozen] = off_m * DOWN[:, None]
     seen_way = replace(seen_way, position_m=place, covariance_m2=covariance)
     found = rest_s(seen_way.with_modes([], [lasting]))
     assert found is not None and abs(found - rests) < 0.05

@@ -1,4 +1,4 @@
-"""Spring: hung on a spring, up and down.
+"""Spring: to and fro on a spring, hung or along a level track.
 
 The motion tells the period and the damping, whatever the scale; stiffness takes the mass.
 """
@@ -8,7 +8,7 @@ from galileo_jax.clip.scenarios import Scenario, register
 register(
     Scenario(
         name="spring",
-        meaning="one object hangs on a spring and swings up and down",
+        meaning="one object swings on a spring, hung or along a level track",
         has_ramp=False,
         line="down",
         laws=("spring", "start_velocity"),
