@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from galileo_jax.runtime.jax_setup import cache_folder, compile_loops_whole
+from galileo_jax.runtime.jax_setup import cache_folder, set_xla_flags
 from tests.missing import find_shared_data, is_missing
 
 # Before anything imports jax; the commands' own subprocesses inherit it.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 # Small matrices: BLAS's threads wait for each other longer than they compute.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-compile_loops_whole()  # as under the public functions, also in tests that call no such one
+set_xla_flags()  # as under the public functions, also in tests that call no such one
 if folder := cache_folder():
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     # Small programs too, as under the commands: what one process compiled the others read.

@@ -4,6 +4,7 @@ import os
 
 import jax
 import jax.numpy as jnp
+import pytest
 
 from galileo_jax.runtime import jax_setup
 
@@ -22,9 +23,19 @@ def test_a_loop_over_a_batch_becomes_one_kernel():
 
 def test_other_flags_stay(monkeypatch):
     monkeypatch.setenv("XLA_FLAGS", "--xla_dump_to=x")
-    jax_setup.compile_loops_whole()
-    assert os.environ["XLA_FLAGS"].startswith("--xla_dump_to=x --xla_backend_extra_options=")
-    own = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=1"
+    jax_setup.set_xla_flags()
+    flags = os.environ["XLA_FLAGS"].split()
+    assert flags[0] == "--xla_dump_to=x"
+    assert flags[-1] == jax_setup.EXTRA_OPTIONS + jax_setup.WHOLE_LOOPS
+    own = f"{jax_setup.EXTRA_OPTIONS}{ONE_KERNEL}=1 {jax_setup.FUSION_EMITTERS}True"
     monkeypatch.setenv("XLA_FLAGS", own)
-    jax_setup.compile_loops_whole()
+    jax_setup.set_xla_flags()
     assert os.environ["XLA_FLAGS"] == own
+
+
+@pytest.mark.parametrize("jaxlib, is_told", [("0.10.2", True), ("0.11.0", False)])
+def test_only_a_jaxlib_that_knows_a_flag_is_told(monkeypatch, jaxlib: str, is_told: bool):
+    monkeypatch.setenv("XLA_FLAGS", "")
+    monkeypatch.setattr(jax_setup, "version", lambda _: jaxlib)
+    jax_setup.set_xla_flags()
+    assert (jax_setup.FUSION_EMITTERS in os.environ["XLA_FLAGS"]) == is_told
