@@ -1,5 +1,6 @@
 """Pucks seen from above, from a simulated track to what a fit and a diagnosis say of it."""
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -126,13 +127,10 @@ def test_what_grips_or_slips_does_not_lead_astray(tmp_path: Path) -> None:
     assert not result["parameters"]["grip"]["identified"]
 
 
-def walled(folder: Path, walls: Any, **keys) -> Path:
-    """A track with walls as given, and other keys of the clip."""
-    path, _ = made(folder, 54)
-    at = path.with_suffix(".yaml")
-    content = yaml.safe_load(at.read_text()) | {"walls": walls} | keys
-    at.write_text(yaml.safe_dump(content))
-    return path
+@pytest.fixture(scope="module")
+def pucks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A track without walls, to be edited by nobody."""
+    return made(tmp_path_factory.mktemp("pucks"), 54)[0]
 
 
 @pytest.mark.parametrize(
@@ -151,9 +149,12 @@ def walled(folder: Path, walls: Any, **keys) -> Path:
         ([{"from_m": [k, 2.0], "to_m": [k, 3.0]} for k in range(13)], "13 walls; 12 at most"),
     ],
 )
-def test_wrong_walls_are_one_line(tmp_path: Path, walls: Any, said: str) -> None:
+def test_wrong_walls_are_one_line(pucks: Path, tmp_path: Path, walls: Any, said: str) -> None:
+    path = Path(shutil.copy(pucks, tmp_path))
+    content = yaml.safe_load(pucks.with_suffix(".yaml").read_text()) | {"walls": walls}
+    path.with_suffix(".yaml").write_text(yaml.safe_dump(content))
     with pytest.raises(InputError) as caught:
-        gx.load(walled(tmp_path, walls))
+        gx.load(path)
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 

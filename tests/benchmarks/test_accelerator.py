@@ -7,6 +7,7 @@ import pytest
 from benchmarks.__main__ import main
 
 
+@pytest.mark.slow
 def test_it_times_rollouts_and_fits(capsys: pytest.CaptureFixture[str]) -> None:
     few = ["--engine", "rigid", "c", "--batch", "2", "4", "--repeats", "1"]
     assert main(["accelerator", *few, "--fits", "1", "--diagnoses", "0", "--together", "2"]) is None

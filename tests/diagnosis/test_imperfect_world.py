@@ -123,7 +123,7 @@ def thrown(folder, scale_error, slow_m, seed):
     return folder / "toss.yaml"
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path, seed):
     """Of usual sizes, but 30 and 110 times less probable than a scale 3 % off."""
     found = gx.diagnose(thrown(tmp_path, 0.03, 0.001, seed), seed=0)
@@ -132,7 +132,7 @@ def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path
     assert not found.document["adequate"]
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_slow_errors_alone_are_no_effect(tmp_path, seed):
     assert gx.diagnose(thrown(tmp_path, 0.0, 0.002, seed), seed=0).verdict.status == "none"
 

@@ -1,6 +1,7 @@
 """What the network's world draws is what the fit's likelihood allows for."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -29,6 +30,13 @@ def normals(key):
     return lambda shape=(): jax.random.normal(next(keys), shape)
 
 
+@jax.jit
+@functools.partial(jax.vmap, in_axes=(0, None, None, None, None, None))
+def drawn(key, exact, times, bodies, is_filmed, is_tracked_here):
+    """What a film adds to places: one program for all cases."""
+    return measured(exact, times, bodies, is_filmed, is_tracked_here, normals(key)) - exact
+
+
 def motion(experiment) -> tuple[np.ndarray, np.ndarray]:
     times = np.arange(FRAMES) / FPS
     return times, solve(experiment, times).position_m
@@ -47,13 +55,9 @@ def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, is_filmed, is_tr
         jnp.asarray(scene.corner_m[0]),
         jnp.asarray(experiment.mass_kg),
     )
-
-    def drawn(key):
-        filmed, ours = jnp.asarray(1.0 * is_filmed), jnp.asarray(1.0 * is_tracked_here)
-        place = jnp.asarray(exact)
-        return measured(place, jnp.asarray(times), bodies, filmed, ours, normals(key)) - exact
-
-    extra = np.asarray(jax.jit(jax.vmap(drawn))(jax.random.split(jax.random.key(0), NUM_DRAWS)))
+    keys = jax.random.split(jax.random.key(0), NUM_DRAWS)
+    kind = jnp.asarray(1.0 * is_filmed), jnp.asarray(1.0 * is_tracked_here)
+    extra = np.asarray(drawn(keys, jnp.asarray(exact), jnp.asarray(times), bodies, *kind))
     covariance = np.broadcast_to(1e-16 * np.eye(2)[None, ..., None], (2, 2, 2, FRAMES)).copy()
     observation = Observation(
         names=("object1", "object2"),
