@@ -14,6 +14,7 @@ from galileo_jax.results.shown import shown, shown_parameters
 BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ball"}
 FRICTION, RATIO = re.compile(r"k(\d+)"), re.compile(r"mass_ratio(?:_(\d+)_(\d+))?")
 MOST_UNSEEN = 3  # effects of which it is said what could not have been seen
+SHARES = {"frame_rate": "a frame rate", "scale_error": "a scale"}  # strength 0.01: 1 % off
 SAME_AS_RATIO = "phi"  # says again what the ratio of the masses says
 
 
@@ -160,11 +161,15 @@ def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> st
         in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
         asked = [row["effect"] for row in diagnosis["candidates"]]
     told = [name for name in asked if name not in in_question and name in found]
-    parts = []
-    for name in told[:MOST_UNSEEN]:
-        strength, unit = found[name]["strength"], _unit(found[name]["unit"])
-        size = "of any usual strength"
-        if strength is not None:
-            size = f"below {float(f'{strength:.2g}'):g}{unit}"
-        parts.append(f"{_words(name)} {size}")
+    parts = [_smaller(name, found[name]) for name in told[:MOST_UNSEEN]]
     return sentence(f"{listed(parts)} could not have been seen") if parts else ""
+
+
+def _smaller(name: str, told: Mapping[str, Any]) -> str:
+    """An effect that is weaker than its `strength`, in words; of any, where that is None."""
+    strength = told["strength"]
+    if strength is None:
+        return f"{_words(name)} of any usual strength"
+    if name in SHARES:
+        return f"{SHARES[name]} that is off by less than {float(f'{100 * strength:.2g}'):g} %"
+    return f"{_words(name)} below {float(f'{strength:.2g}'):g}{_unit(told['unit'])}"

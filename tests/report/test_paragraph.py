@@ -118,6 +118,15 @@ def test_where_nothing_is_missing_it_is_said_what_could_not_have_been_seen():
     )
 
 
+def test_what_is_a_share_of_something_declared_is_said_in_per_cent():
+    unseen = {name: {"strength": 0.0141, "unit": "1"} for name in ("frame_rate", "scale_error")}
+    said = paragraph(result(k1=entry(0.29, 0.004)), {**CHECK, "could_not_see": unseen}, None)
+    assert said.endswith(
+        "A frame rate that is off by less than 1.4 % and a scale that is off by less than 1.4 % "
+        "could not have been seen."
+    )
+
+
 def test_of_several_explanations_the_values_are_those_with_one_of_them():
     known = result("rolling", k1=entry(0.1, 0.01), rolling=entry(0.2, 0.05))
     unseen = {name: {"strength": 1.0, "unit": "1"} for name in ("air_drag", "table_tilt")}
