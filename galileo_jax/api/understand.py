@@ -153,9 +153,13 @@ class Understood:
             return Likely("ramp", why)
         return Likely("from_above", f"{why}, and what is struck goes off at {slope:.0f} degrees")
 
+    def said_scenario(self, answers: Answers) -> str | None:
+        """Name of the kind of motion that a person declares or answers."""
+        return self.declared.get("scenario") or answers.get("scenario")
+
     def scenario(self, answers: Answers) -> Scenario | None:
         """The kind of motion: as declared, as answered, as it seems; None: nobody knows."""
-        name = self.declared.get("scenario") or answers.get("scenario")
+        name = self.said_scenario(answers)
         if name is None and not {"scenario"} & {*self.declared, *answers}:
             name = likely.scenario if (likely := self.likely(answers)) else None
         return SCENARIOS[name] if name is not None and name in SCENARIOS else None
@@ -329,7 +333,7 @@ def sentence_of(known: Clip | Understood, answers: Answers) -> str:
     if isinstance(known, Clip):
         return _of_clip(known)
     if known.look.seen is not None:
-        return _of_table(known.look.seen)
+        return _of_table(known.look.seen, known.said_scenario(answers))
     fps = known.look.fps
     rate = f" {fps:.4g} pictures a second." if fps else ""
     return f"{_of_film(known, answers)}{rate}"
@@ -343,26 +347,35 @@ def _of_film(known: Understood, answers: Answers) -> str:
         return f"No moving thing was found: {known.unseen}."
     things = "One thing moves" if len(known.things) < 2 else f"{len(known.things)} things move"
     if len(points) > 1 and (likely := known.likely(answers)) is not None:
-        return f"{things}, one after the other: it looks like {_kind(likely.scenario)}."
+        return f"{things}, one after the other: {_taken(likely, known.said_scenario(answers))}."
     path = known.path(points[0])
     if path.likely is None:
         return f"{things}, but cannot be followed."
+    looks = _looks(path.likely, known.said_scenario(answers))
     which = "," if len(known.things) < 2 else "; the one that is followed goes"
-    return f"{things}{which} {path.moved_px:.0f} px {_looks(path.likely)}."
+    return f"{things}{which} {path.moved_px:.0f} px {looks}."
 
 
-def _of_table(seen: Seen) -> str:
+def _of_table(seen: Seen, said: str | None) -> str:
     unit = "rad" if seen.axes == ("angle",) else seen.unit or "(in a unit that it does not say)"
     who = "One thing moves" if len(seen.names) == 1 else f"{len(seen.names)} things move"
     rate = "counted in pictures" if seen.is_in_frames else f"{1 / seen.step:.3g} a second"
-    looks = _looks(seen)
+    looks = _looks(seen, said)
     return f"{who}, {math.hypot(*seen.moved):.3g} {unit} {looks}. {seen.num_rows} rows, {rate}."
 
 
-def _looks(likely: Likely) -> str:
+def _looks(likely: Likely, said: str | None) -> str:
     how = next((f"{word} {likely.why}" for start, word in HOW.items()
                 if likely.why.startswith(start)), f"({likely.why})")  # fmt: skip
-    return f"{how}: it looks like {_kind(likely.scenario)}"
+    return f"{how}: {_taken(likely, said)}"
+
+
+def _taken(likely: Likely, said: str | None) -> str:
+    """What it is taken for: what a person says, or else what it looks like."""
+    looks = f"it looks like {_kind(likely.scenario)}"
+    if said is None or said == likely.scenario or said not in SCENARIOS:
+        return looks
+    return f"it is taken for {_kind(said)}, as you say; {looks}"
 
 
 def _kind(scenario: str) -> str:

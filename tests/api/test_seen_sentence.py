@@ -25,6 +25,8 @@ def test_the_sentence_of_a_table_and_what_is_asked_of_it(tmp_path):
     assert asked == ["scenario", "track_units", "ramp_angle_deg"]
     assert found.answers == {"scenario": "incline", "track_units": "m"}, "Enter takes the default"
     assert found.problems == {"ramp_angle_deg": "ramp_angle_deg: 'steep' is not a number"}
+    other = sentence_of(known, {"scenario": "fall"})
+    assert ": it is taken for a fall, as you say; it looks like an incline. 30 rows" in other
     asked = answered(known, {"scenario": "fall"}).questions
     assert [one.key for one in asked] == ["scenario", "track_units"], "a fall has no ramp"
 
