@@ -52,14 +52,14 @@ def main(argv: Sequence[str]) -> None:
             out = out_folder(to, clips)
             warn(warning for clip in clips for warning in clip.warnings)
             with command.progress_display() as display:
-                found = gx.explain(clips, out=out, **how, on_progress=display, cancel=flag)
+                found = gx.explain(clips, out=out, **how, on_progress=_told(display), cancel=flag)
     except (KeyboardInterrupt, Cancelled):
         raise KeyboardInterrupt(_kept(files)) from None
     except Exception as error:
         if is_bundled:
             _bundle_failure(files, said, to, words, error)
         raise
-    print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
+    print(_filled(found.paragraph))
     print(f"\n{fit_table(found.fit, true_parameters(found.fit.measurements[0].clip.path))}")
     notes_on(found.fit, out)
     command.say(", ".join(map(str, found.files)))
@@ -68,6 +68,22 @@ def main(argv: Sequence[str]) -> None:
 
         made = bundle_of(found, out / NAME, command=words, others=_not_said(files, to))
         command.say(made.line)
+
+
+def _told(display: progress.OnProgress) -> progress.OnProgress:
+    """Progress, and in words what is known before it is asked what is missing: who stops has it."""
+
+    def on_progress(stage: str, share_done: float, partial: Any) -> None:
+        display(stage, share_done, None)
+        if isinstance(partial, gx.Explanation) and share_done < 1:
+            command.say(f"{_filled(f'So far: {partial.paragraph}')}\n")
+
+    return on_progress
+
+
+def _filled(text: str) -> str:
+    """Lines that are not longer than the terminal is wide."""
+    return textwrap.fill(text, min(WIDTH, shutil.get_terminal_size().columns))
 
 
 def _kept(files: Sequence[str]) -> str:

@@ -163,6 +163,26 @@ def test_a_paragraph_then_the_table_of_the_fit(tmp_path, monkeypatch, capsys):
     assert Path("runs/board/report.html").is_file()
 
 
+def test_who_stops_it_while_it_asks_what_is_missing_has_the_fit(tmp_path, monkeypatch, capsys):
+    import galileo_jax as gx
+    from galileo_jax.api import explain as api
+
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(api, "diagnose_fitted", interrupt)
+    gx.simulate(
+        "board.csv", scenario="incline", seed=3, effects=["air_drag"], strength=1, track_only=True
+    )
+    assert command.run(__main__.main, ["board.csv"]) == 130
+    out, err = capsys.readouterr()
+    told, last = err.split("\n\n")
+    assert not out and "So far: The block slid with a friction coefficient of " in told
+    assert "The data contradict the model (p" in " ".join(told.split())
+    assert last.startswith("stopped; kept: board.yaml")
+
+
 @pytest.mark.video
 def test_a_picture_goes_with_the_questions_about_a_film(tmp_path, monkeypatch):
     run = 5.0 * np.clip(np.arange(30.0) - 3, 0, 18)
