@@ -18,14 +18,15 @@ from jaxtyping import Float
 from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.fitted_clip import FittedClip
-from galileo_jax.inference.fits.kernels import FAILED, ClipArrays, Kind, left_of
+from galileo_jax.inference.fits.kernels import FAILED, ClipArrays, left_of
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.transport_map import Valley
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Kind, Problem
 from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.engine_jax import RECORDS
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.batching import FRAMES, rounded_up
@@ -102,6 +103,10 @@ class Part(NamedTuple):
     """A clip's data, and its covariances C_k = s^2 D + L B^T V_k^T g_k^2 V_k B L^T, by sizes k."""
 
     clip: ClipArrays  # as of a fit
+    priors: PriorTable  # of its parameters
+    column: Any  # `[parameter]`, where these stand among those of all clips
+    seen: Any  # `[name]`, where those stand that change what is seen; as of `Share.columns`
+    absent: Any  # as of `Share.absent`
     last_record: Any  # the model's last, where rollouts end
     basis: Any  # B `[mode, value]`, orthonormal rows, in the stated errors
     turned: Any  # V_k `[size, mode, mode]`, orthonormal rows, or 0
@@ -123,8 +128,9 @@ def density_of(
     for index, problem in enumerate(trials.problems):
         clip = FittedClip.of(trials, index)
         rolled.append(_rolled(problem))
-        last = np.asarray(problem.model.num_records)
-        parts.append(Part(clip.arrays, last, *_covariances(clip, draws)))
+        last, own = np.asarray(problem.model.num_records), problem.share
+        where = (clip.priors, clip.column, own.columns, own.absent)
+        parts.append(Part(clip.arrays, *where, last, *_covariances(clip, draws)))
     data = jax.tree.map(jnp.asarray, (tuple(parts), of_sizes, valley))
     if all(hasattr(problem.engine, "roll_out") for problem in trials.problems):
         return Program((log_density, tuple(rolled)), data)
@@ -140,7 +146,7 @@ def _rolled(problem: Problem) -> Rolled:
     effects, count = model.effects + model.nuisances, model.num_records + 1
     roll_out = getattr(engine, "roll_out", None)
     long = count if roll_out is None else rounded_up(count, RECORDS)
-    return Rolled(roll_out or called_back, effects, model.names, long, Kind(*problem.kind))
+    return Rolled(roll_out or called_back, effects, model.names, long, problem.kind)
 
 
 def log_density(
@@ -161,7 +167,7 @@ def log_density(
 def _of_clip(how: Rolled, part: Part, z: jax.Array, noise: jax.Array) -> jax.Array:
     """The log likelihood of a clip, `[size]`."""
     clip, kind = part.clip, how.kind
-    theta = clip.priors.forward(z[clip.column])
+    theta = part.priors.forward(z[part.column])
     position, velocity = how.roll_out(
         how.effects, how.names, how.num_records, kind.record_dt_s, theta, clip.scene
     )
@@ -169,7 +175,8 @@ def _of_clip(how: Rolled, part: Part, z: jax.Array, noise: jax.Array) -> jax.Arr
     is_over = jnp.arange(how.num_records) > part.last_record
     end = jnp.take(position, part.last_record, axis=-1)[..., None]
     position, velocity = jnp.where(is_over, end, position), jnp.where(is_over, 0.0, velocity)
-    left = left_of(kind, theta, position, velocity, clip)
+    own = jnp.concatenate([theta, part.absent])[part.seen]
+    left = left_of(kind, own, position, velocity, clip)
     along2 = jnp.einsum("kmn,n->km", part.turned, part.basis @ left) ** 2
     found = log_density_by_modes(
         jnp.sum(left**2), along2, noise, part.gain, clip.whitening.num_values

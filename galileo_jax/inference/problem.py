@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import Parameter, joined
 from galileo_jax.observation.observation import Observation
+from galileo_jax.rollout.acting_laws import Share, seen_share
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times, in_jax
@@ -60,24 +61,14 @@ class Problem:
         return self.model.parameters
 
     @cached_property
-    def kind(self) -> tuple[tuple[Effect, ...], tuple[str, ...], float]:
-        """What programs are compiled for that take its motions as data.
+    def share(self) -> Share:
+        """What of the model changes what is seen of a motion."""
+        return seen_share(self.model)
 
-        The effects that change what is seen of a motion, the parameters' names, and the time
-        between records. A parameter of another effect is called by its place: the programs are the
-        same whichever effects made the motion.
-        """
-        model, scene = self.model, self.model.scene.surroundings
-        named: dict[bool, set[str]] = {True: set(), False: set()}
-        effects = []
-        for effect in model.effects + model.nuisances:
-            own = type(effect)
-            is_seen = own.time is not Effect.time or own.measure is not Effect.measure
-            effects += [effect] * is_seen
-            named[is_seen] |= {p.name for p in effect.parameters(scene)}
-        others = named[False] - named[True]
-        names = (f"_{i}" if name in others else name for i, name in enumerate(model.names))
-        return tuple(effects), tuple(names), model.record_dt_s
+    @property
+    def kind(self) -> "Kind":
+        """What programs are compiled for that take its motions as data."""
+        return Kind(self.share.effects, self.share.names, self.model.record_dt_s)
 
     @cached_property
     def data(self) -> Whitening:
@@ -136,7 +127,7 @@ class Problem:
         if sizes == self.sizes:
             return self
         other = replace(self, sizes=sizes)
-        for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
+        for name in ("fixed_patterns", "patterns", "seen_motion", "share", "_inverse_root"):
             other.__dict__[name] = getattr(self, name)
         return other
 
@@ -164,7 +155,8 @@ class Problem:
         position, velocity = in_jax(self.engine)(theta[None])
         frames = jnp.asarray(self.observation.times_s)
         surroundings = self.model.scene.surroundings
-        return _seen_one(self.kind, theta, position[0], velocity[0], frames, surroundings)
+        own = self.share.of(theta)
+        return seen(self.kind, own, position[0], velocity[0], frames, surroundings)
 
     def simulate(
         self, theta: Float[np.ndarray, " parameter"]
@@ -180,7 +172,10 @@ class Problem:
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
         kind, scene = self.kind, self.model.scene.surroundings
-        found = self.of_motions(theta, lambda *part: _seen_batch(kind, *part, frames, scene))
+        found = self.of_motions(
+            theta,
+            lambda part, *motion: _seen_batch(kind, self.share.of(part), *motion, frames, scene),
+        )
         return found[..., : len(times)]
 
     def motion(self, theta: Float[np.ndarray, "batch parameter"]) -> Motion:
@@ -292,34 +287,34 @@ def _sharing(problem: Problem, found: Mapping[str, Parameter]) -> Problem:
     return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
 
 
+class Kind(NamedTuple):
+    """What programs are compiled for that take a motion as data: the same for many clips."""
+
+    effects: tuple[Effect, ...]  # that change what is seen of a motion
+    names: tuple[str, ...]  # of the parameters that these may ask for
+    record_dt_s: float
+
+
 def seen(
-    effects: Sequence[Effect],
-    names: Sequence[str],
-    theta: jax.Array,
-    motion: Trajectory,
-    times_s: jax.Array,
+    kind: Kind,
+    theta: Float[jax.Array, " parameter"],
+    position: Float[jax.Array, "object axis record"],
+    velocity: Float[jax.Array, "object axis record"],
+    times_s: Float[Any, " frame"],
     scene: Surroundings,
-) -> jax.Array:
-    """What a camera sees of a motion at its frames' times: `[object, 2, frame]`, m."""
-    named = {name: theta[i] for i, name in enumerate(names)}
-    for effect in effects:
+) -> Float[jax.Array, "object axis frame"]:
+    """What a camera sees of a motion at its frames' times, m; `theta` as `kind` names it."""
+    named = {name: theta[i] for i, name in enumerate(kind.names)}
+    for effect in kind.effects:
         times_s = jnp.asarray(effect.time(times_s, named, scene))
-    position, _ = at_times(motion, times_s)
-    for effect in effects:
-        position = jnp.asarray(effect.measure(position, named, scene))
-    return position
-
-
-def _seen_one(kind, theta, position, velocity, times_s, scene):
-    effects, names, record_dt_s = kind
-    times = jnp.arange(position.shape[-1]) * record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(times, position, velocity)
-    return seen(effects, names, theta, motion, times_s, scene)
+    recorded = jnp.arange(position.shape[-1]) * kind.record_dt_s
+    found, _ = at_times(Trajectory(recorded, position, velocity), times_s)
+    for effect in kind.effects:
+        found = jnp.asarray(effect.measure(found, named, scene))
+    return found
 
 
 @trace_cached(num_static=1)
 def _seen_batch(kind, theta, position, velocity, times_s, scene):
-    return jax.vmap(lambda t, p, v: _seen_one(kind, t, p, v, times_s, scene))(
-        theta, position, velocity
-    )
+    return jax.vmap(lambda t, p, v: seen(kind, t, p, v, times_s, scene))(theta, position, velocity)

@@ -1,24 +1,31 @@
-"""Which laws act in a rollout: the others are not computed.
+"""Parts of a model that programs are compiled for.
 
 Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Rollouts in
 which no force and no friction law acts have a program without any, in which the motion between
 events is known in closed form. All others share one, which is told which laws act in its batch. In
 the same way rims that are not round, which take seven times as long, have programs apart.
-Where a law is none of the package's its programs cannot be kept (`trace_cache`), and are made anew
-in every process: then there is one for all.
+
+A part of library effects holds all of them that have a place in the scene: those that the model
+does not have do nothing, and a fit and a diagnosis, of whatever effects, call the same programs.
+Where an effect is none of the package's its programs cannot be kept (`trace_cache`), and are made
+anew in every process: then there is one for all.
 """
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool
 
-from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.effect import HOOKS, Effect
+from galileo_jax.model.effects.registry import library_effects
 from galileo_jax.model.model import Model
 
 STEADY, WITH_LAWS, WITH_OVALS = 0, 1, 2  # kinds of rollouts: bits of one number
-LAW_HOOKS, OVAL_HOOKS = ("force", "push", "friction"), ("oval",)
+LAW_HOOKS, OVAL_HOOKS = {"force", "push", "friction"}, {"oval"}
+SEEN_HOOKS = {"time", "measure"}  # that change what is seen of a motion
+TOLD_HOOKS = {"parameters", "odds", "derived"}  # that change neither
 PACKAGE = f"{__name__.split('.')[0]}."
 
 
@@ -28,7 +35,7 @@ class Law:
 
     effect: Effect
     kind: int  # what its rollouts have
-    columns: np.ndarray  # of its parameters in the model
+    columns: np.ndarray  # of its parameters in the model; none where that does not have it
     absent: np.ndarray  # their values where it does nothing
 
     def acts(self, theta: np.ndarray) -> np.ndarray:
@@ -36,27 +43,44 @@ class Law:
         return (theta[:, self.columns] != self.absent).any(axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Share:
-    """Part of a model."""
+    """Part of a model.
 
-    effects: tuple[Effect, ...]  # that may act, nuisances among them
-    names: tuple[str, ...]  # of their parameters
-    columns: tuple[int, ...]  # where these stand among the model's
-    laws: tuple[Law, ...] = ()  # those of `effects` that do not act in every rollout
-    places: tuple[int, ...] = ()  # where these stand among `effects`
+    Attributes:
+      effects: that may act, nuisances among them.
+      names: of their parameters, after those of no effect.
+      columns: `[name]`, where these stand among the model's parameters and, after them, `absent`.
+      absent: values at which effects that the model does not have do nothing.
+      laws: those of `effects` that do not act in every rollout, and where these stand there.
+    """
 
-    def of(self, theta: np.ndarray) -> np.ndarray:
-        """Of `theta` `[batch, parameter]` the columns of `names`."""
-        return theta[:, self.columns]
+    effects: tuple[Effect, ...]
+    names: tuple[str, ...]
+    columns: np.ndarray
+    absent: np.ndarray
+    laws: tuple[tuple[int, Law], ...] = ()
+
+    def of(self, theta: Any) -> Any:
+        """Of `theta` `[..., parameter]` of the model, NumPy's or JAX's, the part's own."""
+        xp = theta.__array_namespace__()
+        absent = xp.asarray(self.absent, dtype=theta.dtype)
+        absent = xp.broadcast_to(absent, (*theta.shape[:-1], len(self.absent)))
+        return xp.concat([theta, absent], axis=-1)[..., self.columns]
 
     def acts(self, theta: np.ndarray) -> np.ndarray | None:
         """Which of `effects` act in any of `theta`, `[effect]`; None: all, in every rollout."""
         if not self.laws:
             return None
         found = np.ones(len(self.effects), bool)
-        found[list(self.places)] = [law.acts(theta).any() for law in self.laws]
+        for place, law in self.laws:
+            found[place] = law.acts(theta).any()
         return found
+
+
+def seen_share(model: Model) -> Share:
+    """What of a model changes what is seen of a motion."""
+    return _share(model, [e for e in _every(model) if _has(e, SEEN_HOOKS)])
 
 
 class ActingLaws:
@@ -89,29 +113,60 @@ class ActingLaws:
         return kinds
 
     def _share_of(self, kind: int) -> Share:
-        laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
-        return self._without([law.effect for law in self._laws if law not in laws], laws)
+        moving = HOOKS - SEEN_HOOKS - TOLD_HOOKS
+        return _share(
+            self._model,
+            [
+                effect
+                for effect in _every(self._model)
+                if (_has(effect, moving) or not _has(effect, SEEN_HOOKS))
+                and (effect in self._model.nuisances or _kind(effect) & ~kind == 0)
+            ],
+        )
 
-    def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
-        model, scene = self._model, self._model.scene.surroundings
-        gone = {parameter.name for effect in left_out for parameter in effect.parameters(scene)}
-        columns = tuple(i for i, name in enumerate(model.names) if name not in gone)
-        effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
-        places = tuple(effects.index(law.effect) for law in laws)
-        return Share(effects, tuple(model.names[i] for i in columns), columns, laws, places)
+
+def _every(model: Model) -> list[Effect]:
+    """The model's effects, its nuisances, and all of the library that have a place in its scene."""
+    scene, own = model.scene.surroundings, model.effects + model.nuisances
+    absent = [e for e in library_effects() if e not in own and e.parameters(scene)]
+    return sorted(absent + list(model.effects), key=lambda e: e.name) + list(model.nuisances)
+
+
+def _share(model: Model, effects: list[Effect]) -> Share:
+    """The part of a model that has these effects; the library's where it has others beside."""
+    scene, library = model.scene.surroundings, library_effects()
+    if any(e in model.effects and e not in library for e in effects):
+        effects = [e for e in effects if e in model.effects + model.nuisances]
+    own = {p.name for e in model.effects + model.nuisances for p in e.parameters(scene)}
+    named = {p.name: p.absent for e in effects for p in e.parameters(scene)}
+    names = dict.fromkeys([*(name for name in model.names if name not in own), *named])
+    others = [name for name in names if name not in model.names]
+    every = [*model.names, *others]
+    laws = [(i, _law(e, model)) for i, e in enumerate(effects) if e not in model.nuisances]
+    return Share(
+        tuple(effects),
+        tuple(names),
+        np.array([every.index(name) for name in names]),
+        np.array([named[name] for name in others]),
+        tuple((i, law) for i, law in laws if law is not None),
+    )
+
+
+def _has(effect: Effect, hooks: set[str]) -> bool:
+    """Whether an effect has one of these hooks."""
+    return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
+
+
+def _kind(effect: Effect) -> int:
+    """What rollouts have in which it acts."""
+    return WITH_LAWS * _has(effect, LAW_HOOKS) | WITH_OVALS * _has(effect, OVAL_HOOKS)
 
 
 def _law(effect: Effect, model: Model) -> Law | None:
     """None of an effect without a place, or without anything that all rollouts do not have."""
-    own = type(effect)
-    bits = ((WITH_LAWS, LAW_HOOKS), (WITH_OVALS, OVAL_HOOKS))
-    kind = sum(
-        bit
-        for bit, hooks in bits
-        if any(getattr(own, hook) is not getattr(Effect, hook) for hook in hooks)
-    )
-    columns = [model.index(p.name) for p in effect.parameters(model.scene.surroundings)]
-    if not kind or not columns:
+    parameters = effect.parameters(model.scene.surroundings)
+    if not _kind(effect) or not parameters:
         return None
-    absent = np.array([model.parameters[i].absent for i in columns])
-    return Law(effect, kind, np.array(columns), absent)
+    own = [p for p in parameters if p.name in model.names]
+    columns = np.array([model.index(p.name) for p in own], int)
+    return Law(effect, _kind(effect), columns, np.array([p.absent for p in own]))

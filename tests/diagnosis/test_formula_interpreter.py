@@ -12,7 +12,6 @@ from galileo_jax.diagnosis.laws.formula_interpreter import (
     ActingFormulas,
     LawAsForce,
     LawAsFriction,
-    Spare,
     codes_of,
 )
 from galileo_jax.diagnosis.laws.grammar import CLASS, law_class, name_of, structures
@@ -25,7 +24,6 @@ from tests.ramp_model import HIT, make_model
 PRIOR = "LogNormal(0.3, 0.5)"
 EVERY = {name_of(one): one for one in structures(has_surface=True, num_objects=2)}
 MODEL = make_model(HIT, 1.0)
-SIZE = 12  # parameters of formulas and spare ones
 
 
 def law_of(structure) -> Any:
@@ -72,8 +70,7 @@ def test_a_formula_as_numbers_does_what_its_class_does(structure):
 def motions_of(*names: str):
     """Rollouts with each of some formulas, by their classes and as numbers."""
     laws = tuple(law_of(EVERY[name]) for name in names)
-    used = sum(1 + len(EVERY[name].constants) for name in names)
-    model = replace(MODEL, effects=(*laws, Spare(SIZE - used)))
+    model = replace(MODEL, effects=laws)
     theta = np.tile([p.absent for p in model.parameters], (len(names) + 1, 1))
     theta[:, [model.index("k1"), model.index("k2")]] = 0.2
     for row, name in zip(theta, names, strict=False):

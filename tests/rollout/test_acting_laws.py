@@ -6,8 +6,10 @@ import jax
 import numpy as np
 import pytest
 
+from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.rollout.acting_laws import ActingLaws
+from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.rollout.acting_laws import ActingLaws, seen_share
 from galileo_jax.rollout.engine_path import EnginePath
 from tests.ramp_model import HIT, make_model, make_theta
 
@@ -41,8 +43,39 @@ def test_rollouts_without_laws_have_a_program_of_their_own(model):
     assert sorted(others) == [2, 3, 4, 5, 8, 9]
     assert {"air_drag", "friction_patch"}.isdisjoint(effect.name for effect in steady.effects)
     assert "friction_patch_start" not in steady.names and "restitution" in steady.names
-    assert steady.names == tuple(np.array(model.names)[list(steady.columns)])
-    assert whole.effects == model.effects + model.nuisances and whole.names == model.names
+    assert {"air_drag", "friction_patch_start"} <= set(whole.names)
+    for name, column in zip(steady.names, steady.of(theta).T, strict=True):
+        if name in model.names:
+            np.testing.assert_array_equal(column, theta[:, model.index(name)])
+
+
+def test_models_of_a_scene_share_their_programs(model):
+    """Whatever effects they have: what only one of them has does nothing in the other's."""
+    bare = replace(model, effects=())
+    drag = replace(model, effects=make_effects(("air_drag", "frame_rate")))
+    (one, _), (acting, _) = ActingLaws(model).shares(
+        np.concatenate([thetas(model, 1), thetas(model, 1, air_drag=0.3)])
+    )
+    ((other, _),) = ActingLaws(bare).shares(thetas(bare, 1))
+    ((dragging, _),) = ActingLaws(drag).shares(thetas(drag, 1, air_drag=0.3))
+    pairs = [(one, other), (acting, dragging), (seen_share(bare), seen_share(drag))]
+    for mine, its in pairs:
+        assert (mine.effects, mine.names) == (its.effects, its.names)
+    assert "release_delay" in seen_share(bare).names and "release_delay" not in one.names
+
+
+def test_an_effect_of_a_users_own_has_parts_of_this_models_effects(model):
+    class Kick(Effect):
+        name = "kick"
+        unknowns = (Parameter("kick", "m/s", Normal(0.0, 1.0), 0.0, "effect"),)
+
+        def start_speed(self, theta, scene):
+            return scene.only(theta["kick"], 0)
+
+    own = replace(model, effects=(*make_effects(("air_drag",)), Kick()))
+    ((share, _),) = ActingLaws(own).shares(thetas(own, 1))
+    assert {e.name for e in share.effects if e not in own.nuisances} == {"air_drag", "kick"}
+    assert "kick" not in seen_share(own).names and "release_delay" in seen_share(own).names
 
 
 def test_rollouts_with_the_same_laws_are_side_by_side(model):
@@ -57,7 +90,8 @@ def test_only_laws_that_act_in_the_batch_do(model):
     def idle(theta) -> set[str]:
         acts = share.acts(theta)
         assert acts is not None
-        return {effect.name for effect, one in zip(share.effects, acts, strict=True) if not one}
+        every = {effect.name for effect, one in zip(share.effects, acts, strict=True) if not one}
+        return every & {effect.name for effect in model.effects}
 
     assert idle(thetas(model, 2)) == {"air_drag", "friction_patch"}
     both = np.concatenate([thetas(model, 1, air_drag=0.3), thetas(model, 1)])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.diagnosis.laws.formula_interpreter import MOST_NUMBERS, ActingFormulas, Spare
+from galileo_jax.diagnosis.laws.formula_interpreter import ActingFormulas
 from galileo_jax.diagnosis.laws.grammar import (
     Structure,
     class_source,
@@ -194,12 +194,10 @@ def _with_laws(
     """The trials with these laws in place of the library."""
     laws = tuple(law_class(source)() for source in sources)
     laws = tuple(sorted(laws, key=lambda law: law.name))
-    used = sum(1 + len(structure.constants) for structure in structures)
-    spare = Spare(NUM_LAWS * MOST_NUMBERS - used)
     named = {name_of(structure): structure for structure in structures}
     problems = []
     for problem in trials.problems:
-        model = replace(problem.model, effects=(*laws, spare))
+        model = replace(problem.model, effects=laws)
         engine = make_engine(problem.engine.name, model)
         if isinstance(engine, EngineJax):
             engine = type(engine)(model, ActingFormulas(model, named))

@@ -24,14 +24,13 @@ from galileo_jax.model.effects.effect import (
 )
 from galileo_jax.model.effects.law import against_motion, changed_friction
 from galileo_jax.model.model import Model
-from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.model.parameters import Parameter
 from galileo_jax.rollout.acting_laws import STEADY, WITH_LAWS, ActingLaws, Share
 
 STRENGTH, IS_ON_ALL, NATURE = "law", "law_is_on_all", "law_nature"
 FIRST, SECOND = ("law_1", "law_1_a", "law_1_b"), ("law_2", "law_2_a", "law_2_b")
 NAMES = (STRENGTH, IS_ON_ALL, NATURE, *FIRST, *SECOND)
 NATURES = ("push", "drag", "drag_force", "friction")
-MOST_NUMBERS = 5  # of a formula: the strength and the constants of two factors
 TOGETHER = 2  # kind of rollouts in which several formulas act
 
 
@@ -114,7 +113,7 @@ def _factor(factors: Sequence[Factor], own: Sequence[Array], place: tuple, xp: A
     return value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OneLaw(Share):
     """Part of a model: without its formulas, but with the one that acts in each rollout.
 
@@ -165,13 +164,14 @@ class ActingFormulas(ActingLaws):
     def _share_of(self, kind: int) -> Share:
         if kind == TOGETHER:
             return super()._share_of(WITH_LAWS)
-        without = self._without(list(self._model.effects))
+        without = super()._share_of(STEADY)
         if kind == STEADY:
             return without
         return OneLaw(
             (LawAsForce(), LawAsFriction(), *without.effects),
             (*without.names, *NAMES),
             without.columns,
+            without.absent,
             formulas=self._formulas,
         )
 
@@ -188,23 +188,3 @@ def codes_of(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
         codes[names[0]] = float(factors.index(factor)) + 1.0
         slots += names[1 : 1 + len(factor.constants)]
     return np.array(list(codes.values())), np.array([NAMES.index(name) for name in slots])
-
-
-@dataclass(frozen=True, eq=False)
-class Spare(Effect):
-    """Parameters of no effect, never free: models of few formulas are as large as of many."""
-
-    count: int
-
-    name: ClassVar[str] = "spare"
-
-    def identity(self) -> tuple[Any, ...]:
-        """The class: its attributes reach hooks as parameters."""
-        return (type(self),)
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """As many as are wanted."""
-        prior = Normal(0.0, 1.0)
-        return tuple(
-            Parameter(f"spare_{i}", "1", prior, 0.0, "given", None) for i in range(self.count)
-        )

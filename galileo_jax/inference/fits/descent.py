@@ -1,7 +1,7 @@
 """Levenberg-Marquardt from many points at once: optimistix's steps, rollouts in batches.
 
 optimistix's own loop would compile the rollout, and with MuJoCo's engines it cannot. So its parts
-(`programs.propose`) decide where to look next, and what they need to know of that place (residuals
+(`kernels.propose`) decide where to look next, and what they need to know of that place (residuals
 and their slopes) comes from one batch of rollouts for all points. A point that has settled leaves
 the batch.
 
@@ -27,13 +27,14 @@ from galileo_jax.inference.fits.residuals import (
 )
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.numerics.normal_matrix import inverse
-from galileo_jax.runtime.batching import MOTIONS, in_chunks, one_at_a_time
+from galileo_jax.runtime.batching import MOTIONS, in_chunks, one_at_a_time, rounded_up
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 
 # Of a parameter's coarse step. The rigid engine rounds below its own; MuJoCo's contacts are rough
 # below theirs; above the largest a step may leave a plateau (nothing moves) over its edge, and the
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+PARAMETERS = 16  # numbers of them are rounded up to multiples, where a step is proposed
 FEW = 4  # proposals of which all slopes are taken
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
@@ -93,6 +94,26 @@ def in_valley(best: Quadratic, first: int, others: np.ndarray) -> np.ndarray:
     step = best.z[others] - best.z[first]
     far = 0.5 * np.einsum("pi,ij,pj->p", step, best.normal[first], step)
     return np.maximum(far, best.cost[others] - best.cost[first]) < SAME_VALLEY_NATS
+
+
+def _proposals(
+    region: np.ndarray, is_first: np.ndarray, here: Quadratic, there: Quadratic
+) -> tuple[np.ndarray, ...]:
+    """As `propose`, which is compiled for few numbers of parameters: those added stay at 0."""
+    size = here.z.shape[1]
+    more = rounded_up(size, PARAMETERS) - size
+
+    def wider(one: Quadratic) -> Quadratic:
+        z, gradient = (np.pad(rows, [(0, 0), (0, more)]) for rows in (one.z, one.gradient))
+        normal = np.pad(one.normal, [(0, 0), (0, more), (0, more)])
+        normal[:, range(size, size + more), range(size, size + more)] = 1.0
+        return Quadratic(z, one.cost, gradient, normal)
+
+    alone = one_at_a_time(propose)
+    region, accepts, z, promised = in_chunks(
+        POINTS, alone, region, is_first, wider(here), wider(there)
+    )
+    return region, accepts, z[:, :size], promised
 
 
 def join(best: Quadratic, owner: np.ndarray, joined: np.ndarray) -> None:
@@ -166,8 +187,8 @@ class Descent:
             own = Quadratic(*(leaf[active] for leaf in best))
             new = self._quadratic(there, own, widths, active)
             is_first = np.full(len(active), num_steps == 0)
-            region[active], accepts, proposed[active], promised[active] = in_chunks(
-                POINTS, one_at_a_time(propose), region[active], is_first, own, new
+            region[active], accepts, proposed[active], promised[active] = _proposals(
+                region[active], is_first, own, new
             )
             for leaf, value in zip(best, new, strict=True):
                 leaf[active[accepts]] = value[accepts]

@@ -4,13 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.inference.fits.kernels import ClipArrays, Kind
+from galileo_jax.inference.fits.kernels import ClipArrays
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Kind, Problem
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.runtime.batching import FRAMES, SPARE_MODES, rounded_up
 from galileo_jax.runtime.device_cache import OnDevice
 from galileo_jax.similarity.gaussian_likelihood import Whitening
+
+# Half a difference that gives a derivative of order 1 to some 1e-10, for rounding as for curvature.
+RATE_Z = 1e-5
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,9 @@ class FittedClip:
     """One clip of the trials, ready for compiled code."""
 
     problem: Problem  # of the clip
+    priors: PriorTable  # of its parameters
+    absent: np.ndarray  # `[own parameter]`, values in their units where pinned
+    column: np.ndarray  # `[own parameter]`, where these stand among those of all clips
     host: ClipArrays  # all that its programs need, padded
     on_device: OnDevice[ClipArrays]  # the same
 
@@ -25,19 +31,20 @@ class FittedClip:
     def of(cls, trials: JointProblem, index: int) -> "FittedClip":
         """The clip of that index."""
         problem = trials.problems[index]
-        host = ClipArrays(
-            *_padded(problem),
-            problem.model.scene.surroundings,
+        host = ClipArrays(*_padded(problem), problem.model.scene.surroundings)
+        return cls(
+            problem,
             PriorTable.of(problem.parameters),
             np.array([p.absent for p in problem.parameters]),
             trials.columns[index],
+            host,
+            OnDevice(host),
         )
-        return cls(problem, host, OnDevice(host))
 
     @property
     def kind(self) -> Kind:
         """What its programs are compiled for."""
-        return Kind(*self.problem.kind)
+        return self.problem.kind
 
     @property
     def arrays(self) -> ClipArrays:
@@ -51,8 +58,13 @@ class FittedClip:
 
     def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """`[point, joint parameter]` to this clip's parameters in their units."""
-        column, priors, absent = self.host.column, self.host.priors, self.host.absent
-        return np.where(free[:, column], priors.in_units(z[:, column]), absent)
+        own = self.priors.in_units(z[:, self.column])
+        return np.where(free[:, self.column], own, self.absent)
+
+    def rates(self, z: np.ndarray) -> np.ndarray:
+        """How fast this clip's parameters change with `z` `[point, joint parameter]`."""
+        ahead, back = (self.priors.in_units(z[:, self.column] + s) for s in (RATE_Z, -RATE_Z))
+        return (ahead - back) / (2 * RATE_Z)
 
     def search_noise(self, search_sd_m: float) -> float:
         """The noise scale at which the tracker's median error is that."""

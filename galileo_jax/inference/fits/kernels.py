@@ -9,12 +9,9 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from galileo_jax.inference.problem import seen
+from galileo_jax.inference.problem import Kind, seen
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.model.parameters import PriorTable
-from galileo_jax.rollout.rollout import Trajectory
 from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
@@ -22,14 +19,6 @@ from galileo_jax.similarity.gaussian_likelihood import Whitening
 # (Nocedal and Wright, 2006, ch. 4). optimistix's own, 0.99, crawls in a curved valley.
 HIGH_CUTOFF = 0.75
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
-
-
-class Kind(NamedTuple):
-    """What programs are compiled for: hashable, the same for many clips."""
-
-    effects: tuple
-    names: tuple[str, ...]
-    record_dt_s: float
 
 
 class Quadratic(NamedTuple):
@@ -47,9 +36,6 @@ class ClipArrays(NamedTuple):
     times_s: Any  # `[frame]`
     whitening: Whitening  # with masked frames and idle modes added
     scene: Surroundings  # what it shows
-    priors: PriorTable  # of its parameters
-    absent: np.ndarray  # `[own parameter]`, values in their units where pinned
-    column: np.ndarray  # `[own parameter]`, where these stand among those of all clips
 
 
 def left_of(kind: Kind, theta, position, velocity, clip: ClipArrays):
@@ -68,10 +54,7 @@ def white_of(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
 
 def _difference_m(kind: Kind, theta, position, velocity, clip: ClipArrays) -> Any:
     """Observed minus predicted, `[object, axis, frame]`."""
-    times = jnp.arange(position.shape[-1]) * kind.record_dt_s
-    # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(times, position, velocity)
-    predicted = seen(kind.effects, kind.names, theta, motion, clip.times_s, clip.scene)
+    predicted = seen(kind, theta, position, velocity, clip.times_s, clip.scene)
     return clip.whitening.observed_m - predicted
 
 
@@ -84,23 +67,22 @@ def white_batch(kind: Kind, theta, position, velocity, noise, clip: ClipArrays):
 
 
 @trace_cached(num_static=1)
-def seen_slopes_batch(kind: Kind, z, free, noise, index, position, velocity, clip: ClipArrays):
-    """Residuals of motions `[point, value]`, and their slopes `[point, value, parameter]`.
+def seen_slopes_batch(kind: Kind, theta, index, noise, position, velocity, clip: ClipArrays):
+    """Residuals of motions `[point, value]`, and their slopes `[point, value, column]`.
 
-    In the parameters of `index` `[point, parameter]`, which change what is seen of a motion, not
-    the motion: clock and camera. `z` of all clips.
+    In the parameters of `index` `[point, column]`, which change what is seen of a motion, not the
+    motion: clock and camera.
     """
 
-    def one(z, free, noise, index, position, velocity):
-        def residuals(u):
-            own = z.at[index].add(u, mode="drop")[clip.column]
-            theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
-            return white_of(kind, theta, position, velocity, noise, clip)
+    def one(theta, index, noise, position, velocity):
+        def residuals(change):
+            moved = theta.at[index].add(change, mode="drop")
+            return white_of(kind, moved, position, velocity, noise, clip)
 
         zero = jnp.zeros(index.shape[0])
         return residuals(zero), jax.jacfwd(residuals)(zero)
 
-    return jax.vmap(one)(z, free, noise, index, position, velocity)
+    return jax.vmap(one)(theta, index, noise, position, velocity)
 
 
 @trace_cached(num_static=0)

@@ -111,7 +111,7 @@ class Residuals:
         for c, motion in enumerate(motions or self.motions(points)):
             white, jacobian = self._seen_slopes(c, points, index, motion)
             moves = np.append(self._is_simulated, False)
-            moves &= np.isin(np.arange(self._count + 1), self.clips[c].host.column)
+            moves &= np.isin(np.arange(self._count + 1), self.clips[c].column)
             point, slot = np.nonzero(moves[index])
             which = index[point, slot]
             step, rows = steps[point, which], np.arange(len(point))
@@ -131,16 +131,23 @@ class Residuals:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Residuals of a clip's points, and slopes as of `Slopes` in clock and camera; others 0."""
         clip = self.clips[c]
-        seen = _free_index(points.free & ~self._is_simulated)
+        theta, *moved = motion
+        share, rates = clip.problem.share, clip.rates(points.z)
+        # Where each of its parameters stands among those of all clips; in none: the count of all.
+        own = np.append(clip.column, np.full(len(share.absent), self._count))[share.columns]
+        is_seen = np.pad(points.free & ~self._is_simulated, [(0, 0), (0, 1)])
+        seen = _free_index(is_seen[:, own])
         white, slopes = in_chunks(
             POINTS,
             lambda *rows: seen_slopes_batch(clip.kind, *rows, clip.arrays),
-            *(points.z, points.free, points.noise[:, c], seen, *motion[1:]),
+            *(share.of(theta), seen, points.noise[:, c], *moved),
         )
         jacobian = np.zeros((*white.shape, index.shape[1]))
-        point, column = np.nonzero(seen < self._count)
-        slot = np.argmax(index[point] == seen[point, column][:, None], axis=1)
-        jacobian[point, :, slot] = slopes[point, :, column]
+        point, column = np.nonzero(seen < len(own))
+        which = seen[point, column]
+        slot = np.argmax(index[point] == own[which][:, None], axis=1)
+        rate = rates[point, share.columns[which]]
+        jacobian[point, :, slot] = rate[:, None] * slopes[point, :, column]
         return white, jacobian
 
     def _whites(self, c: int, points: Batch) -> Float[np.ndarray, "point value"]:
@@ -166,7 +173,8 @@ def _open(each: Float[np.ndarray, "side row value"]) -> Float[np.ndarray, "row v
 
 def _white(clip: FittedClip) -> Callable[..., Any]:
     """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
-    return lambda *part: white_batch(clip.kind, *part, clip.arrays)
+    own = clip.problem.share.of
+    return lambda theta, *part: white_batch(clip.kind, own(theta), *part, clip.arrays)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:

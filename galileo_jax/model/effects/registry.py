@@ -61,6 +61,13 @@ def effect_names() -> tuple[str, ...]:
     return effect_registry.names()
 
 
+@functools.cache
+def library_effects() -> tuple[Effect, ...]:
+    """Those of the package itself, in alphabetical order."""
+    every = (effect_registry[name] for name in effect_names())
+    return tuple(effect() for effect in every if effect.__module__.startswith(f"{LIBRARY}."))
+
+
 def make_effects(names: Sequence[str]) -> tuple[Effect, ...]:
     """The effects of these names, in the alphabetical order in which their hooks are applied.
 
