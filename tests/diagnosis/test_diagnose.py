@@ -105,6 +105,7 @@ def test_without_an_effect_nothing_is_missing(tmp_path):
     assert {each.name for each in found.candidates} == set(CANDIDATES)
 
 
+@pytest.mark.slow
 def test_two_effects_are_named_together(tmp_path):
     """Neither explains the data alone, so that pairs are tried."""
     air_drag, restitution = make_effects(["air_drag", "restitution"])

@@ -123,7 +123,8 @@ def thrown(folder, scale_error, slow_m, seed):
     return folder / "toss.yaml"
 
 
-@pytest.mark.parametrize("seed", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3])
 def test_a_wrong_scale_is_missing_though_imperfections_could_explain_it(tmp_path, seed):
     """Of usual sizes, but 30 and 110 times less probable than a scale 3 % off."""
     found = gx.diagnose(thrown(tmp_path, 0.03, 0.001, seed), seed=0)

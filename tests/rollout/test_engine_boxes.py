@@ -189,6 +189,7 @@ def test_a_batch_is_its_rollouts():
         assert position[i] == pytest.approx(alone[0], abs=ALONE_ATOL_M)
 
 
+@pytest.mark.slow
 def test_three_boxes():
     third = ClipObject(name="object3", shape="box", size_m=(0.05, 0.05, 0.06), z_m=0.01)
     model = of_boxes([*cubes(), third])

@@ -101,6 +101,7 @@ def test_a_library_of_one_effect_has_no_pairs(tmp_path):
     assert set(table.entries) == {frozenset(), frozenset(PAIRS[:1])}
 
 
+@pytest.mark.slow
 def test_what_does_the_same_as_one_of_a_pair_is_found_where_slopes_mean_nothing(tmp_path):
     """A late release and rolling; with the release, a wrong frame rate passes for the rest."""
     truth, rival = ("release_delay", "rolling"), ("release_delay", "frame_rate")
