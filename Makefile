@@ -44,7 +44,8 @@ test-plain-processor: $(READY)
 	$(PLAIN) $(PYTEST) tests/docs
 	$(PYTEST) tests/api/test_processors.py
 	$(PLAIN) $(PYTEST) -m "not slow" tests/commands/test_fit.py tests/commands/test_compare.py \
-	  tests/commands/test_predict.py tests/inference/test_coverage.py
+	  tests/commands/test_predict.py tests/inference/test_coverage.py \
+	  tests/neural/test_estimate.py tests/measurement/test_check_frame_rate.py
 
 # What annotations say of shapes and types, at every call; of the rooms that are all numbers.
 NUMERICS := model rollout similarity statespace

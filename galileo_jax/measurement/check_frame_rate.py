@@ -28,6 +28,7 @@ LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or 
 LEAST_FACTOR_FREE = 1.4  # too few frames of what touches nothing: nothing else falls so fast
 SURE_SDS = 4.0  # by which gravity must be off
 UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
+CLEARLY_NEARER = 0.5  # of the way to another explanation
 PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
 LEAST_SHARE = 1 / PIXELS_FROM**2  # of gravity that rough friction leaves in another unit
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
@@ -61,9 +62,11 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         return None
     likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
     if (unit := _likely_unit(clip, found)) is not None:
-        nearest = min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
+        # Gravity goes with the rate's square. What is ten times off fits cm as well as a rate.
+        nearest = 2 * min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
         words, off = unit
-        likely = f"likely {words}" if off < 2 * nearest else f"{likely} (or {words})"
+        is_nearer = off < CLEARLY_NEARER * nearest
+        likely = f"likely {words}" if is_nearer else f"{likely} (or {words})"
     name, more = observation.names[0], "at least " if found.is_least else ""
     error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (

@@ -133,7 +133,7 @@ def _estimate(network: PosteriorNetwork, seen: Seen, summary: Summary, seed: int
     """Draws `[draw]` of the three numbers that a clip can tell."""
     single = {
         "features": summary.features.astype(jnp.float32)[None],
-        "profile": summary.profile.astype(jnp.float16)[None],
+        "profile": summary.profile.astype(jnp.float32)[None],
         "centre": summary.centre[None],
         "scale": summary.scale[None],
         "is_hit": np.asarray(summary.is_hit)[None],

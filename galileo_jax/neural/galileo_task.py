@@ -100,7 +100,7 @@ def to_sample(seen: Seen, truth: Truth) -> dict[str, jax.Array]:
     single = jnp.float32
     return {
         "features": summary.features.astype(single),
-        "profile": summary.profile.astype(jnp.float16),
+        "profile": summary.profile.astype(single),
         "u": to_u(target, summary.centre, summary.scale).astype(single),
         "centre": summary.centre.astype(single),
         "scale": summary.scale.astype(single),

@@ -68,6 +68,15 @@ def test_a_factor_is_told_with_the_likely_rate(make, factor, tmp_path):
     assert likely == pytest.approx(FPS, rel=0.02)
 
 
+@pytest.mark.parametrize("stretch", [1 - 1e-9, 1.0, 1 + 1e-9])
+def test_no_rounding_decides_between_a_rate_and_a_unit(stretch, tmp_path):
+    """Ten times the rate and a hundredth of a metre say the same of gravity."""
+    clip, seen = fall(tmp_path)
+    seen = replace(seen, position_m=stretch * seen.position_m)
+    told = frame_rate_doubt(*off(clip, seen, 10.0))
+    assert told is not None and "likely fps: " in told and "(or its columns in cm" in told
+
+
 def test_the_container_is_believed_where_gravity_agrees(tmp_path):
     clip, seen = fall(tmp_path)
     told = frame_rate_doubt(*off(clip, seen, 10.0, container=61.0))
