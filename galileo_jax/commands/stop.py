@@ -60,14 +60,15 @@ def stoppable(last_words: Callable[[], str]) -> Iterator[threading.Event]:
 
 
 def end(code: int) -> NoReturn:
-    """Ends the program; where Ctrl-C stopped it, without waiting for what still compiles.
+    """Ends the program; where it was stopped or refused, without waiting for what still compiles.
 
     By then everything that was being written is whole or gone (`runtime.atomic_write`), and the
-    threads that are left make programs for the cache.
+    threads that are left make programs for the cache. XLA aborts the process if Python ends one of
+    them.
     """
     # What ends by itself has nothing left to be saved: a Ctrl-C now needs no traceback.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    if code == STOPPED:
+    if code == STOPPED or (code and threading.active_count() > 1):
         leave(code)
     sys.exit(code)
 

@@ -136,8 +136,8 @@ def measure(clip: Clip) -> Measurement:
         clip = _with_foot(clip, told)
     needs_slope, way = scenario.has_ramp and clip.ramp_angle_deg is None, None
     if needs_slope and clip.video is not None:
-        # The object's outline stands along the ramp: a first look, without it, tells how steep.
-        clip = _inclined(clip, observed(_without_sizes(clip))[0])
+        # The object's outline stands along the ramp: a first look, as a disc, tells how steep.
+        clip = _inclined(clip, observed(_as_discs(clip))[0])
     whole, pixels = observed(clip)
     tracked = whole
     if needs_slope:
@@ -229,17 +229,22 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
     return clip if scenario.has_table else moving
 
 
-def _without_sizes(clip: Clip, **update: Any) -> Clip:
-    """For a first look: outlines are placed by what is not known yet."""
-    unknown = tuple(item.model_copy(update={"size_m": None}) for item in clip.objects)
-    return clip.model_copy(update={"objects": unknown, **update})
+def _as_discs(clip: Clip, **update: Any) -> Clip:
+    """For a first look, which does not know how they stand: the disc that fits into each object."""
+    discs = tuple(
+        item.model_copy(update={"shape": "sphere", "size_m": (min(item.size_m[::2]) / 2,)})
+        if item.shape == "box" and item.size_m is not None
+        else item
+        for item in clip.objects
+    )
+    return clip.model_copy(update={"objects": discs, **update})
 
 
 def _with_foot(clip: Clip, told: _Inferring) -> Clip:
     """The clip with the foot of its ramp, from a first look at the path."""
     assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
     about = (0.0, 0.0) if clip.rectangle is None else clip.rectangle.corners_px[0]
-    first_look, _ = observed(_without_sizes(clip, origin_px=about))
+    first_look, _ = observed(_as_discs(clip, origin_px=about))
     x, y = picture_plane(clip, about).to_pixels(infer_foot(clip, first_look))
     origin = (round(float(x), 1), round(float(y), 1))
     # As good as the point that was followed is the object's centre.

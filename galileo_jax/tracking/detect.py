@@ -8,7 +8,7 @@ stands on something. Where no features move and nothing flies, it is the silhoue
 farthest.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -21,7 +21,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.picture import OpenFrames
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.silhouette import Path, paths_of
+from galileo_jax.tracking.silhouette import Path, differences, paths_of
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
@@ -36,6 +36,8 @@ MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03  # share of the frame's width within which a thing counts as at the border
 RIM_POINTS = 64  # at which a disc's edge is looked at
+LEAST_TURNING, LEAST_OUTLINES = 3, 3
+"""Features that tell how a thing has turned; outlines of it that must be seen."""
 LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked by chance
 STRAY, LEAST_WAY = 0.03, 3.0
 """Of its way, by which what flies is off a parabola in time, and by more of which that is bent; how
@@ -46,12 +48,13 @@ many of its sizes it flies at least."""
 class Mover:
     """A thing that moves."""
 
-    # middle of its features in the first frame in which it is seen, `(x, y)`
+    # its middle in the first frame in which it is seen, `(x, y)`
     point_px: tuple[float, float]
     onset_frame: int  # when it had moved by `MOVED_PX`
     num_features: int  # how many features agree on it; 0 of a silhouette
     leaves_picture: bool  # whether its features were last seen going over the border
-    places_px: np.ndarray  # `[feature, 2]`, the features in that frame; of a silhouette two corners
+    # `[corner, 2]`, of its outline in that frame; where none was seen, its features
+    places_px: np.ndarray
     goes_right: bool = True  # whether its features were last seen to the right of where they began
     first_frame: int = 0  # in which it is seen
     flies: bool = False  # whether nothing but its weight moves it
@@ -92,10 +95,18 @@ def find_movers(
     onset = np.where(settled.any(axis=0), settled.argmax(axis=0), -1)
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
-    movers, groups = [], _groups(path, onset, span_px)
-    margin = BORDER_SHARE * size_px[0]
-    for members in groups:
-        places, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
+    groups = _groups(path, onset, span_px)
+    ways = paths_of(open_frames, np.arange(len(path))) if may_fly or not groups else []
+    ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
+    flying = [
+        one
+        for one in ways
+        if _flies(one) and not any(_is_same(one, path[:, members]) for members in groups)
+    ]
+    movers, margin = [], BORDER_SHARE * size_px[0]
+    labels = differences(open_frames, len(path)) if may_fly else {}
+    for members, places in _with_outlines(path, onset, groups, labels):
+        began, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
         beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
         movers.append(
             Mover(
@@ -104,13 +115,9 @@ def find_movers(
                 num_features=len(members),
                 leaves_picture=bool(np.mean(beyond.any(axis=1)) > 0.3),
                 places_px=places,
-                goes_right=bool(np.median(last[:, 0] - places[:, 0]) >= 0),
+                goes_right=bool(np.median(last[:, 0] - began[:, 0]) >= 0),
             )
         )
-    ways = paths_of(open_frames, np.arange(len(path))) if may_fly or not movers else []
-    ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
-    known = [path[:, members] for members in groups]
-    flying = [one for one in ways if _flies(one) and not any(_is_same(one, own) for own in known)]
     if not movers and not flying:
         farthest = max(ways, key=lambda one: one.way_px, default=None)
         if farthest is None or farthest.way_px < farthest.parts[0].size_px:
@@ -123,8 +130,8 @@ def find_movers(
 def _silhouette(path: Path) -> Mover:
     first, frame = path.parts[0], path.frames[0]
     x, y = first.centre_px
-    corners = np.stack([first.low_px, first.high_px]).astype(float)
     goes_right = bool(path.parts[-1].centre_px[0] >= x)
+    corners = np.stack([first.low_px, first.high_px]).astype(float)
     point = (float(x), float(y))
     return Mover(point, frame, 0, False, corners, goes_right, frame, _flies(path))
 
@@ -142,10 +149,123 @@ def _flies(path: Path) -> bool:
 
 def _is_same(path: Path, places: np.ndarray) -> bool:
     """Whether a silhouette is the thing of features `[frame, feature, 2]`, while these are seen."""
-    frames = [i for i, frame in enumerate(path.frames) if np.isfinite(places[frame, :, 0]).any()]
-    seen = places[np.array(path.frames, int)[frames]]
-    off = np.hypot(*np.moveaxis(np.nanmedian(seen, axis=1) - path.places_px[frames], -1, 0))
-    return bool(len(frames) and np.median(off) < np.median(path.sizes_px))
+    off = np.hypot(*(_medians(places)[path.frames] - path.places_px).T)
+    off = off[np.isfinite(off)]
+    return bool(off.size and np.median(off) < np.median(path.sizes_px))
+
+
+def _with_outlines(
+    path: np.ndarray, onset: np.ndarray, groups: list[np.ndarray], labels: Mapping[int, np.ndarray]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Groups of features, `[member]`, with the outlines of their things, `[corner, 2]`.
+
+    Those that set out with a thing from within its outline are of it.
+    """
+    since = [float(np.median(onset[members])) for members in groups]
+    middles = np.array([_medians(path[:, members]) for members in groups])
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    begun: list[float] = []
+    for own in sorted(range(len(groups)), key=lambda i: -len(groups[i])):
+        members, apart = groups[own], np.abs(np.array(since) - since[own])
+        for i, (others, outline) in enumerate(found):
+            if abs(begun[i] - since[own]) <= SAME_ONSET_FRAMES and _holds(
+                outline, path[0, members]
+            ):
+                found[i] = np.concatenate([others, members]), outline
+                break
+        else:
+            places, others = path[:, members], middles[apart > SAME_ONSET_FRAMES]
+            found.append((members, _outlined(places, others, labels)))
+            begun.append(since[own])
+    return found
+
+
+def _outlined(
+    places: np.ndarray, others: np.ndarray, labels: Mapping[int, np.ndarray]
+) -> np.ndarray:
+    """The outline of a thing in the first frame, `[corner, 2]`: of what it has left, or come to.
+
+    Features may be all on one side of it, as on a box with a label. Where it has gone all its
+    length, it is one of the parts in which the picture differs from the first, at either end of its
+    way; but not where another thing is then, or was at first. Without a part that holds its
+    features: these.
+
+    `places`: of its features `[frame, feature, 2]`. `others`: of other things `[thing, frame, 2]`.
+    `labels`: by frame, of the parts, `[height, width]`; 0: as in the first.
+    """
+    began, found = places[0], []
+    for frame, parts in labels.items():
+        now = places[frame]
+        seen = np.isfinite(now[:, 0])
+        if seen.sum() < LEAST_TURNING:
+            continue
+        left, reached = (_part_at(parts, each[seen]) for each in (began, now))
+        back, off = _moved_back(now[seen], began[seen])
+        for end, part in ((began[seen], left), (now[seen], reached)):
+            if not part or left == reached or (part == reached and off > SAME_WAY_PX):
+                continue
+            hull = _hull_of(parts == part)
+            apart = np.linalg.norm(others[:, [0, frame]] - np.median(end, axis=0), axis=-1)
+            outline = hull if part == left else back(hull)
+            is_alone = not (apart < np.hypot(*np.ptp(hull, axis=0))).any()
+            is_whole = (hull > 1).all() and (hull < np.array(parts.shape[::-1]) - 2).all()
+            if is_alone and is_whole and _holds(outline, began):
+                found.append(outline)
+    if len(found) < LEAST_OUTLINES:
+        return began
+    # What nobody follows, as a hand, may be in half of them, and makes these larger.
+    areas = [cv2.contourArea(hull.astype(np.float32)) for hull in found]
+    return found[int(np.argsort(areas)[len(areas) // 4])]
+
+
+def _medians(places: np.ndarray) -> np.ndarray:
+    """Of features `[frame, feature, 2]` those that are seen, `[frame, 2]`; NaN where none is."""
+    found = np.full((len(places), 2), np.nan)
+    seen = np.isfinite(places[..., 0]).any(axis=1)
+    found[seen] = np.nanmedian(places[seen], axis=1)
+    return found
+
+
+def _part_at(parts: np.ndarray, places: np.ndarray) -> int:
+    """The part in which most of some places are; 0: none, as where most are at the border."""
+    height, width = parts.shape
+    x, y = np.clip(np.round(places).astype(int), 0, (width - 1, height - 1)).T
+    return int(np.argmax(np.bincount(parts[y, x]))) if len(places) else 0
+
+
+def _hull_of(mask: np.ndarray) -> np.ndarray:
+    """The convex polygon round a part, `[corner, 2]`, as far inside as its outermost features.
+
+    That is two pixels: smoothing adds one, and features are found on the inner side of an edge.
+    """
+    less = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8))
+    inner = cv2.findNonZero(less if less.any() else mask.astype(np.uint8))
+    return cv2.convexHull(inner).reshape(-1, 2).astype(float)
+
+
+def _holds(outline: np.ndarray, places: np.ndarray) -> bool:
+    """Whether most of some places are in an outline, or next to it."""
+    hull = cv2.convexHull(outline.astype(np.float32))
+    inside = [cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in places]
+    return bool(np.mean(np.array(inside) > -SAME_WAY_PX) > MOST)
+
+
+def _moved_back(
+    now: np.ndarray, began: np.ndarray
+) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+    """The turn and shift of points that takes features from `now` to where they began.
+
+    And the median distance by which these are off then, px.
+    """
+    a, b = now @ (1, 1j), began @ (1, 1j)
+    turn = np.vdot(a - a.mean(), b - b.mean())
+    turn /= max(abs(turn), np.finfo(float).tiny)
+
+    def back(points: np.ndarray) -> np.ndarray:
+        moved = turn * (points @ (1, 1j) - a.mean()) + b.mean()
+        return np.stack([moved.real, moved.imag], axis=-1)
+
+    return back, float(np.median(np.hypot(*(back(now) - began).T)))
 
 
 def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:

@@ -19,9 +19,14 @@ OpenFrames = Callable[[], Iterable[np.ndarray]]
 """Gives the frames of a film from its beginning, BGR or grey."""
 
 
+def some_indices(count: int) -> list[int]:
+    """Of the `count` frames of a film the numbers of `SOME_FRAMES`, the first among them."""
+    return np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist()
+
+
 def some_frames(open_frames: OpenFrames, count: int) -> list[np.ndarray]:
-    """`SOME_FRAMES` of the `count` frames of a film."""
-    chosen = set(np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist())
+    """These frames."""
+    chosen = set(some_indices(count))
     return [frame for index, frame in enumerate(open_frames()) if index in chosen]
 
 

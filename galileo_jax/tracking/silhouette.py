@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.numerics.least_squares import polynomial
-from galileo_jax.tracking.picture import OpenFrames, some_frames
+from galileo_jax.tracking.picture import OpenFrames, some_frames, some_indices
 from galileo_jax.tracking.pose import length
 
 NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or grey levels, is noise
@@ -133,14 +133,34 @@ def _scene(kept: list[np.ndarray]) -> np.ndarray:
     return np.array(rows, np.int16)
 
 
-def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
-    """What differs from the scene in any colour, largest first, without what the edge cuts."""
+def differences(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
+    """By the number of some later frames, the parts in which they differ from the first one.
+
+    `[height, width]`, a number for each connected part, 0 where there is no difference; frames in
+    which the camera has moved are left out. `count`: of all frames.
+    """
+    first, *others = zip(some_indices(count), some_frames(open_frames, count), strict=True)
+    every = {index: _differs(frame, first[1]) for index, frame in others}
+    return {
+        index: cv2.connectedComponents(mask.astype(np.uint8))[1]
+        for index, mask in every.items()
+        if mask.mean() <= MOST_FOREGROUND
+    }
+
+
+def _differs(picture: np.ndarray, scene: np.ndarray) -> np.ndarray:
+    """Where a picture differs from the scene in any colour, `[height, width]`."""
     differs = cv2.GaussianBlur(picture.astype(np.int16) - scene, (0, 0), SMOOTH_PX)
     some = np.atleast_3d(differs)[::4, ::4]
     middle = np.median(some, axis=(0, 1))
     noise = 1.4826 * np.median(np.abs(some - middle), axis=(0, 1))
     most = np.maximum(NOISE_SDS * noise, LEAST_GREY)
-    mask = cv2.inRange(differs, middle - most, middle + most) == 0
+    return cv2.inRange(differs, middle - most, middle + most) == 0
+
+
+def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
+    """What differs from the scene in any colour, largest first, without what the edge cuts."""
+    mask = _differs(picture, scene)
     if mask.mean() > MOST_FOREGROUND:
         return []
     _, _, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))

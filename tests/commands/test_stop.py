@@ -112,3 +112,15 @@ def test_what_does_not_listen_is_left_behind(folder):
     assert code == 130 and told.startswith("stopped; ")
     assert seconds < SOON_S
     assert files(folder) == ["clip.mp4"]
+
+
+def test_who_is_refused_does_not_wait_for_what_still_compiles():
+    """Nor does Python end a thread that is in XLA, which aborts the process."""
+    code = (
+        "import threading\n"
+        "from galileo_jax.commands.stop import end\n"
+        "threading.Thread(target=threading.Event().wait).start()\n"
+        "end(2)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], timeout=120, check=False)
+    assert done.returncode == 2

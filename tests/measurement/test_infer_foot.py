@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.measure import _as_discs, measure
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.tracking.clip import outline_of
 
 SCALE_PX_PER_M = 600.0
 FOOT_PX = (700.0, 520.0)
@@ -65,6 +66,15 @@ def test_foot(angle_deg: float, direction: str, declared: str, tmp_path: Path) -
     lines = measured.remarks
     assert "origin_px: null; " in lines[0]
     assert len(lines) == len(measured.inferred)
+
+
+def test_a_first_look_follows_the_disc_that_fits_into_a_box(tmp_path: Path) -> None:
+    """Its turn is not known yet, and a plain box is followed by its label, wherever that is."""
+    clip = load_clip(write_track(tmp_path))
+    (seen,) = _as_discs(clip, origin_px=FOOT_PX).objects
+    outline = outline_of(clip, seen)
+    assert outline.is_round and outline.size_px == pytest.approx((36.0, 36.0))
+    assert clip.objects[0].shape == "box"
 
 
 @pytest.mark.parametrize("change, words", [

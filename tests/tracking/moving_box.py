@@ -46,6 +46,21 @@ class Ringed(Box):
         return drawn.astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Labelled(Box):
+    """A plain box with a textured label near its upper left corner."""
+
+    size_px: tuple[int, int] = (60, 44)
+    label_px: tuple[int, int] = (22, 18)  # width and height
+
+    def texture(self) -> np.ndarray:
+        width, height = (FINE * n for n in self.size_px)
+        drawn = np.full((height, width), 88, np.float32)
+        label = Box(self.label_px, self.seed).texture()
+        drawn[8 : 8 + label.shape[0], 8 : 8 + label.shape[1]] = label
+        return drawn
+
+
 def scene(size_px: tuple[int, int], seed: int = 9) -> np.ndarray:
     """A quiet background, at the fine resolution, `[height, width]` float32."""
     rng = np.random.default_rng(seed)

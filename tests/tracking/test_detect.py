@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.template import Outline, grey
-from tests.tracking.moving_box import RELEASE, Box, film, throw
+from tests.tracking.moving_box import RELEASE, Box, Labelled, film, throw
 
 pytestmark = pytest.mark.video
 
@@ -57,6 +58,32 @@ def test_a_thing_whose_middle_is_plain_is_one_thing():
     frames = film([(Box((12, 26), seed=0), left), (Box((12, 26), seed=4), right)])
     (mover,) = find_movers(lambda: iter(frames), 44)
     np.testing.assert_allclose(mover.point_px, [66, 80], atol=3)
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.25])
+def test_the_middle_of_a_labelled_box_is_not_that_of_its_label(turn_rad):
+    """All its features are on the label, 12 px to the side; as it goes on it may turn."""
+    time = np.arange(40.0)
+    gone = 5.0 * np.clip(time - 6, 0, 24)
+    way = np.stack([50 + gone, 60 + 0.4 * gone, turn_rad - turn_rad * (gone > 60)], axis=1)
+    frames = film([(Labelled(), way)], size_px=(280, 180))
+    (mover,) = find_movers(lambda: iter(frames), 44)
+    np.testing.assert_allclose(mover.point_px, way[0, :2], atol=1.5)
+    size = np.ptp(mover.places_px @ rotation(turn_rad), axis=0) + 2.0  # features lie inside
+    np.testing.assert_allclose(size, Labelled().size_px, rtol=0.1)
+
+
+def test_what_comes_to_where_a_thing_was_does_not_make_it_larger():
+    """Object 1 stops where object 2 has been."""
+    time = np.arange(40.0)
+    zero = 0 * time
+    second = np.stack([130 + 6.0 * np.clip(time - 9, 0, 18), 80 + zero, zero], axis=1)
+    first = np.stack([50 + 4.0 * np.clip(time - 4, 0, 20), 80 + zero, zero], axis=1)
+    frames = film([(Labelled(seed=2), second), (Labelled(), first)], size_px=(320, 160))
+    movers = find_movers(lambda: iter(frames), 44)
+    assert len(movers) == 2
+    for mover, path in zip(movers, (first, second), strict=True):
+        np.testing.assert_allclose(mover.point_px, path[0, :2], atol=1.5)
 
 
 def test_two_things_that_set_out_together_and_part_are_two():
