@@ -127,9 +127,12 @@ class ActingLaws:
 
 def _every(model: Model) -> list[Effect]:
     """The model's effects, its nuisances, and all of the library that have a place in its scene."""
-    scene, own = model.scene.surroundings, model.effects + model.nuisances
-    absent = [e for e in library_effects() if e not in own and e.parameters(scene)]
-    return sorted(absent + list(model.effects), key=lambda e: e.name) + list(model.nuisances)
+    scene, own, found = model.scene.surroundings, set(model.names), list(model.effects)
+    for effect in library_effects():
+        names = {parameter.name for parameter in effect.parameters(scene)}
+        if names and not names & own:  # a law of the scenario's may have a name of the library's
+            found.append(effect)
+    return sorted(found, key=lambda e: e.name) + list(model.nuisances)
 
 
 def _share(model: Model, effects: list[Effect]) -> Share:

@@ -210,11 +210,12 @@ def _outlined(
             is_alone = not (apart < np.hypot(*np.ptp(hull, axis=0))).any()
             is_whole = (hull > 1).all() and (hull < np.array(parts.shape[::-1]) - 2).all()
             if is_alone and is_whole and _holds(outline, began):
-                found.append(outline)
+                # Its features are on it, also where it looks like what is behind.
+                found.append(_hull(np.concatenate([outline, began])))
     if len(found) < LEAST_OUTLINES:
         return began
     # What nobody follows, as a hand, may be in half of them, and makes these larger.
-    areas = [cv2.contourArea(hull.astype(np.float32)) for hull in found]
+    areas = [cv2.contourArea(outline.astype(np.float32)) for outline in found]
     return found[int(np.argsort(areas)[len(areas) // 4])]
 
 
@@ -239,13 +240,17 @@ def _hull_of(mask: np.ndarray) -> np.ndarray:
     That is two pixels: smoothing adds one, and features are found on the inner side of an edge.
     """
     less = cv2.erode(mask.astype(np.uint8), np.ones((5, 5), np.uint8))
-    inner = cv2.findNonZero(less if less.any() else mask.astype(np.uint8))
-    return cv2.convexHull(inner).reshape(-1, 2).astype(float)
+    return _hull(cv2.findNonZero(less if less.any() else mask.astype(np.uint8)))
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """The corners of the convex polygon round points, `[corner, 2]`."""
+    return cv2.convexHull(points.astype(np.float32)).reshape(-1, 2).astype(float)
 
 
 def _holds(outline: np.ndarray, places: np.ndarray) -> bool:
     """Whether most of some places are in an outline, or next to it."""
-    hull = cv2.convexHull(outline.astype(np.float32))
+    hull = _hull(outline).astype(np.float32)
     inside = [cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in places]
     return bool(np.mean(np.array(inside) > -SAME_WAY_PX) > MOST)
 
