@@ -44,7 +44,7 @@ def in_contrast(open_frames: OpenFrames, count: int) -> OpenFrames:
 
 def _weights(open_frames: OpenFrames, count: int) -> Float[np.ndarray, "3"] | None:
     """Of blue, green and red, their sizes adding up to 1; None: grey shows what moves."""
-    kept = [_small(frame) for frame in some_frames(open_frames, count)]
+    kept = [_small(frame) for frame in some_frames(open_frames, count).values()]
     if len(kept) < 3 or kept[0].ndim < 3:
         return None
     off = (kept - np.median(kept, axis=0)).reshape(-1, 3)

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
-from galileo_jax.tracking.picture import OpenFrames
+from galileo_jax.tracking.picture import OpenFrames, some_frames
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.silhouette import Path, differences, paths_of
 from galileo_jax.tracking.template import Outline, grey
@@ -96,7 +96,9 @@ def find_movers(
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     groups = _groups(path, onset, span_px)
-    ways = paths_of(open_frames, np.arange(len(path))) if may_fly or not groups else []
+    looks_on = may_fly or not groups
+    some = some_frames(open_frames, len(path)) if looks_on else {}
+    ways = paths_of(open_frames, np.arange(len(path)), some) if looks_on else []
     ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
     flying = [
         one
@@ -104,7 +106,7 @@ def find_movers(
         if _flies(one) and not any(_is_same(one, path[:, members]) for members in groups)
     ]
     movers, margin = [], BORDER_SHARE * size_px[0]
-    labels = differences(open_frames, len(path)) if may_fly else {}
+    labels = differences(some) if some else {}
     for members, places in _with_outlines(path, onset, groups, labels):
         began, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
         beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
@@ -161,23 +163,20 @@ def _with_outlines(
 
     Those that set out with a thing from within its outline are of it.
     """
-    since = [float(np.median(onset[members])) for members in groups]
+    groups = sorted(groups, key=len, reverse=True)
+    since = np.array([np.median(onset[members]) for members in groups])
     middles = np.array([_medians(path[:, members]) for members in groups])
-    found: list[tuple[np.ndarray, np.ndarray]] = []
-    begun: list[float] = []
-    for own in sorted(range(len(groups)), key=lambda i: -len(groups[i])):
-        members, apart = groups[own], np.abs(np.array(since) - since[own])
-        for i, (others, outline) in enumerate(found):
-            if abs(begun[i] - since[own]) <= SAME_ONSET_FRAMES and _holds(
-                outline, path[0, members]
-            ):
-                found[i] = np.concatenate([others, members]), outline
+    found: dict[int, tuple[np.ndarray, np.ndarray]] = {}  # by the number of its first group
+    for own, members in enumerate(groups):
+        together = np.abs(since - since[own]) <= SAME_ONSET_FRAMES
+        for first, (others, outline) in found.items():
+            if together[first] and _holds(outline, path[0, members]):
+                found[first] = np.concatenate([others, members]), outline
                 break
         else:
-            places, others = path[:, members], middles[apart > SAME_ONSET_FRAMES]
-            found.append((members, _outlined(places, others, labels)))
-            begun.append(since[own])
-    return found
+            outline = _outlined(path[:, members], middles[~together], labels)
+            found[own] = members, outline
+    return list(found.values())
 
 
 def _outlined(

@@ -19,15 +19,10 @@ OpenFrames = Callable[[], Iterable[np.ndarray]]
 """Gives the frames of a film from its beginning, BGR or grey."""
 
 
-def some_indices(count: int) -> list[int]:
-    """Of the `count` frames of a film the numbers of `SOME_FRAMES`, the first among them."""
-    return np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist()
-
-
-def some_frames(open_frames: OpenFrames, count: int) -> list[np.ndarray]:
-    """These frames."""
-    chosen = set(some_indices(count))
-    return [frame for index, frame in enumerate(open_frames()) if index in chosen]
+def some_frames(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
+    """By their numbers `SOME_FRAMES` of the `count` frames of a film, the first among them."""
+    chosen = set(np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist())
+    return {index: frame for index, frame in enumerate(open_frames()) if index in chosen}
 
 
 class Picture:

@@ -9,6 +9,7 @@ are not carried along by marks that turn, and are the mean place of what is smea
 known of a turn, and what touches another moving thing is one part with it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import cv2
@@ -16,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.numerics.least_squares import polynomial
-from galileo_jax.tracking.picture import OpenFrames, some_frames, some_indices
+from galileo_jax.tracking.picture import OpenFrames, some_frames
 from galileo_jax.tracking.pose import length
 
 NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or grey levels, is noise
@@ -103,9 +104,16 @@ class Path:
         return min(near, 0.5 + 0.5 * back / (TURN_BACK * way + OFF_SIZE * last.size_px))
 
 
-def paths_of(open_frames: OpenFrames, clock: Float[np.ndarray, " frame"]) -> list[Path]:
-    """The paths of all that moves before a scene that stands still; none if the camera moves."""
-    scene = _scene(some_frames(open_frames, len(clock)))
+def paths_of(
+    open_frames: OpenFrames,
+    clock: Float[np.ndarray, " frame"],
+    some: Mapping[int, np.ndarray] | None = None,
+) -> list[Path]:
+    """The paths of all that moves before a scene that stands still; none if the camera moves.
+
+    `some`: as of `some_frames`, where they were read already.
+    """
+    scene = _scene(list((some or some_frames(open_frames, len(clock))).values()))
     done: list[Path] = []
     going: list[Path] = []
     for index, frame in enumerate(open_frames()):
@@ -133,14 +141,13 @@ def _scene(kept: list[np.ndarray]) -> np.ndarray:
     return np.array(rows, np.int16)
 
 
-def differences(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
-    """By the number of some later frames, the parts in which they differ from the first one.
+def differences(some: Mapping[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """By the number of each later frame, the parts in which it differs from the first one.
 
     `[height, width]`, a number for each connected part, 0 where there is no difference; frames in
-    which the camera has moved are left out. `count`: of all frames.
+    which the camera has moved are left out. `some`: as of `some_frames`.
     """
-    first, *others = zip(some_indices(count), some_frames(open_frames, count), strict=True)
-    every = {index: _differs(frame, first[1]) for index, frame in others}
+    every = {index: _differs(frame, some[0]) for index, frame in some.items() if index}
     return {
         index: cv2.connectedComponents(mask.astype(np.uint8))[1]
         for index, mask in every.items()

@@ -48,16 +48,16 @@ class Ringed(Box):
 
 @dataclass(frozen=True)
 class Labelled(Box):
-    """A plain box with a textured label near its upper left corner."""
+    """A plain box with a label of 24 by 18 px, black and white, in its upper left corner."""
 
     size_px: tuple[int, int] = (60, 44)
-    label_px: tuple[int, int] = (22, 18)  # width and height
 
     def texture(self) -> np.ndarray:
         width, height = (FINE * n for n in self.size_px)
-        drawn = np.full((height, width), 88, np.float32)
-        label = Box(self.label_px, self.seed).texture()
-        drawn[8 : 8 + label.shape[0], 8 : 8 + label.shape[1]] = label
+        drawn = np.full((height, width), 105, np.float32)
+        cells = np.random.default_rng(self.seed).permutation([0.0, 255.0] * 6).reshape(3, 4)
+        label = np.kron(cells, np.ones((6 * FINE, 6 * FINE)))
+        drawn[2 * FINE :, 2 * FINE :][: label.shape[0], : label.shape[1]] = label
         return drawn
 
 

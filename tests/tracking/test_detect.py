@@ -62,7 +62,7 @@ def test_a_thing_whose_middle_is_plain_is_one_thing():
 
 @pytest.mark.parametrize("turn_rad", [0.0, 0.25])
 def test_the_middle_of_a_labelled_box_is_not_that_of_its_label(turn_rad):
-    """All its features are on the label, 12 px to the side; as it goes on it may turn."""
+    """Its features may all be on the label, far to the side; as it goes on it may turn."""
     time = np.arange(40.0)
     gone = 5.0 * np.clip(time - 6, 0, 24)
     way = np.stack([50 + gone, 60 + 0.4 * gone, turn_rad - turn_rad * (gone > 60)], axis=1)
