@@ -125,7 +125,7 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
         assert found.frame_size_px is not None  # of a video
         edge = EDGE_SHARE * found.frame_size_px[0]
         if len(seen) > 1 or foot is None or edge < foot[0] < found.frame_size_px[0] - edge:
-            return Proposal(scenario, fps, seen, standing, direction, ramp, foot)
+            return Proposal(scenario, fps, seen, standing, found.direction, ramp, foot)
         # It is stopped at the picture's edge rather than going on along a table.
     return Proposal("ramp", fps, objects, sizes, direction, doubts=(doubts[0],))
 

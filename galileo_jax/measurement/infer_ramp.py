@@ -44,7 +44,7 @@ class Slope:
 
 
 def infer_slope(clip: Clip, observation: Observation) -> Slope:
-    """The slope of the way that the first object takes down the ramp.
+    """The slope of the way that the first object takes down the ramp, or up.
 
     Raises:
       InputError: it hardly moves on the ramp, against the declared direction, or on the level.
@@ -77,7 +77,11 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
             f" moves by only {float(np.ptp(line.along @ points)):.3g} {unit} on the ramp, "
             "too little to determine the slope"
         )
-    if line.along[0] < 0:
+    goes_back = line.along[0] < 0
+    if goes_back:
+        line = line._replace(along=-line.along)
+    angle_deg = falls_deg(line)
+    if goes_back and angle_deg < MIN_RAMP_ANGLE_DEG:
         if clip.is_own_track:
             raise InputError(
                 f"{clip.path}: track: {name}'s x decreases; x along the travel expected; turn the "
@@ -88,7 +92,6 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
             f"{clip.path}: direction: {clip.direction}, but {name} moves to the {other}; "
             f"write direction: {other}"
         )
-    angle_deg = falls_deg(line)
     if angle_deg < MIN_RAMP_ANGLE_DEG:
         # A valley: what rolls down into it comes to rest as high as it began.
         angle_deg = max(angle_deg, _at_start_deg(points, line))
@@ -200,12 +203,11 @@ def distance_at_hit(observation: Observation, k: int) -> float | None:
     first, second = observation.position_m[k, 0, both], observation.position_m[k + 1, 0, both]
     if both.sum() < 2 * NUM_BESIDE + 1:
         return None
-    noise = math.sqrt(float(np.median(observation.covariance_m2[k + 1, 0, 0, both])))
-    gone = second - np.median(second[:NUM_BESIDE])
-    if np.median(gone[-NUM_BESIDE:]) < CLEARLY * noise:
+    away = observation.first_away(k + 1)
+    if away is None:
         return None
     apart, times = second - first, observation.times_s[both]
-    at = int(np.argmax(gone > CLEARLY * noise))
+    at = int(np.searchsorted(np.flatnonzero(both), away))
     before, after = slice(max(at - 1 - NUM_BESIDE, 0), max(at - 1, 0)), slice(at, at + NUM_BESIDE)
     if min(len(apart[before]), len(apart[after])) < 2:
         return float(apart.min())

@@ -25,7 +25,13 @@ from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import SIZE_SD_M, infer_foot, infer_sizes, infer_slope
-from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
+from galileo_jax.measurement.path_direction import (
+    OtherWay,
+    other_way,
+    rises_forward,
+    turned_back,
+    way_text,
+)
 from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, cuts_of, segment
 from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
@@ -135,8 +141,11 @@ def measure(clip: Clip) -> Measurement:
     if scenario.has_table and in_pixels and clip.origin_px is None:
         clip = _with_foot(clip, told)
     needs_slope, way = scenario.has_ramp and clip.ramp_angle_deg is None, None
-    if needs_slope and clip.video is not None:
-        # The object's outline stands along the ramp: a first look, as a disc, tells how steep.
+    # The object's outline stands along the ramp: a first look, as a disc, tells how steep.
+    is_first_look = needs_slope and clip.video is not None
+    if scenario.has_ramp and not scenario.has_table and scenario.angle_deg is None:
+        clip = _downhill(clip, observed(_as_discs(clip) if is_first_look else clip)[0], told)
+    if is_first_look:
         clip = _inclined(clip, observed(_as_discs(clip))[0])
     whole, pixels = observed(clip)
     tracked = whole
@@ -255,6 +264,17 @@ def _with_foot(clip: Clip, told: _Inferring) -> Clip:
         f"{clip.objects[0].name}'s path"
     )
     return clip.model_copy(update={"origin_px": origin})
+
+
+def _downhill(clip: Clip, observation: Observation, told: _Inferring) -> Clip:
+    """The clip with the direction in which its board falls, where object 1 is pushed up first."""
+    if not rises_forward(clip, segment(clip, observation).used(observation)):
+        return clip
+    other = "left" if clip.direction == "right" else "right"
+    told.say(
+        f"{observation.names[0]} goes up to the {clip.direction}: the board falls to the {other}"
+    )
+    return clip.model_copy(update={"direction": other})
 
 
 def _inclined(clip: Clip, observation: Observation, told: _Inferring | None = None) -> Clip:

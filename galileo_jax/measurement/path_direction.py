@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galileo_jax.clip.fields import MIN_RAMP_ANGLE_DEG
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
@@ -64,8 +65,10 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     path = falls_deg(line)
     is_spring = "spring" in scenario.laws
     may_turn = is_spring or not observation.is_tracked_here
-    period = 180.0 if is_spring else 360.0  # what goes to and fro has no end
-    apart = abs((declared - path + period / 2) % period - period / 2)
+    # What goes to and fro has no end; a board may be gone up as well as down.
+    apart = abs(_turn_between(path, declared, 180.0 if is_spring or scenario.has_ramp else 360.0))
+    if scenario.has_ramp and not may_turn:
+        path = _turn_between(path, 0.0, 180.0)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
     if may_turn and apart > NEARER * max(off_axis, sd):
         return OtherWay(declared, path, sd, True)
@@ -74,6 +77,28 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     if sd > MOST_SD_DEG or not is_straight or apart < CLEAR * known:
         return None
     return OtherWay(declared, path, sd, may_turn and apart > TURNED_DEG)
+
+
+def rises_forward(clip: Clip, observation: Observation) -> bool:
+    """Whether object 1 goes straight up along `direction`: the board falls the other way.
+
+    By as much as it is declared to fall, where that is declared.
+    """
+    points = observation.position_m[0][:, observation.mask[0]]
+    if points.shape[1] < MIN_POINTS:
+        return False
+    line = line_through(points)
+    away = points - line.middle[:, None]
+    if np.abs(line.across @ away).max() > STRAIGHT * np.ptp(line.along @ away):
+        return False
+    rises = -_turn_between(falls_deg(line), 0.0, 180.0)
+    declared = clip.ramp_angle_deg
+    return rises >= MIN_RAMP_ANGLE_DEG and (declared is None or abs(rises - declared) < TURNED_DEG)
+
+
+def _turn_between(one_deg: float, other_deg: float, period_deg: float) -> float:
+    """The smallest turn from the second direction to the first, of those a period apart."""
+    return (one_deg - other_deg + period_deg / 2) % period_deg - period_deg / 2
 
 
 def turned_back(clip: Clip, observation: Observation, way: OtherWay) -> Observation:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,18 +12,21 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.contrast import in_contrast
-from galileo_jax.tracking.detect import CameraMovesError, find_movers, fit_outline
+from galileo_jax.tracking.detect import CameraMovesError, Mover, find_movers, fit_outline
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import OpenFrames
+from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.square_view import square_view
-from galileo_jax.tracking.template import Outline, grey
+from galileo_jax.tracking.template import WINDOW_PX, Outline, grey
 from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Seen, track_video
 from galileo_jax.video import decode
 
 UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
+
+Point = tuple[float, float]
 
 
 def track_clip(clip: Clip) -> Track:
@@ -35,7 +38,9 @@ def track_clip(clip: Clip) -> Track:
     video = clip.video
     if video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
-    passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
+    sizes = [outline_of(clip, item).size_px for item in clip.objects]
+    is_told = all(item.point_px is not None for item in clip.objects) and None not in sizes
+    passes = 2 if is_told else 3
     total, done = passes * max(clip.frame_count, 1), itertools.count(1)
     names = [item.name for item in clip.objects]
     view = None if clip.is_camera_plain else square_view(clip)
@@ -55,9 +60,9 @@ def track_clip(clip: Clip) -> Track:
     square = clip if view is None else view.clip(clip)
     is_mixed = decode.is_interlaced(video)
     shown = open_frames if is_mixed else in_contrast(open_frames, clip.frame_count)
-    if passes == 3:
-        square = _with_points(square, shown, advance)
-    starts = [_start(square, item) for item in square.objects]
+    movers = [] if is_told else _movers(square, shown, advance)
+    square = _with_points(square, movers, shown)
+    starts = [_start(square, item, movers) for item in square.objects]
     coding = Coding(decode.predicted_from_before(video))
     if view is not None:
         coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
@@ -66,34 +71,72 @@ def track_clip(clip: Clip) -> Track:
     return found if view is None else view.track(found, clip)
 
 
-def _start(clip: Clip, item: ClipObject) -> Start:
+def _start(clip: Clip, item: ClipObject, movers: Sequence[Mover]) -> Start:
     """Where an object is first seen, and where somebody has put it right."""
     assert item.point_px is not None
 
-    def seen_at(point_px: tuple[float, float], frame: int) -> Start:
+    def seen_at(point_px: Point, frame: int) -> Start:
         there = item.model_copy(update={"point_px": point_px})
-        return Start(item.name, point_px, outline_of(clip, there), frame)
+        outline = outline_of(clip, there)
+        if outline.size_px is None:
+            outline = _seen_outline(outline, point_px, frame, movers)
+        return Start(item.name, point_px, outline, frame)
 
     first = seen_at(item.point_px, item.first_frame or 0)
     later = tuple(seen_at((x, y), frame) for frame, x, y in sorted(item.corrections))
     return replace(first, last_frame=item.last_frame, corrections=later)
 
 
-def _with_points(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) -> Clip:
-    """The clip with a `point_px` for every object: those not declared go to what moves."""
+def _seen_outline(
+    outline: Outline, point_px: Point, frame: int, movers: Sequence[Mover]
+) -> Outline:
+    """An outline with the size that is seen: as far about the point as the thing is on both sides.
+
+    A shadow on one side of it, or what holds it, is then left out. Of the smallest thing that is
+    seen there; of unknown size where there is none.
+    """
+    found: list[tuple[float, float]] = []
+    for mover in movers:
+        own = (mover.places_px + mover.way_px[frame] - point_px) @ rotation(outline.angle_rad)
+        width, height = 2 * np.minimum(-own.min(axis=0), own.max(axis=0))
+        if min(width, height) > WINDOW_PX:  # NaN, where it is not seen, compares False
+            found.append((float(width), float(height)))
+    if not found:
+        return outline
+    width, height = min(found, key=math.prod)
+    if outline.is_round:
+        width = height = min(width, height)
+    return replace(outline, size_px=(width, height))
+
+
+def _movers(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) -> list[Mover]:
+    """What moves in a film of which a mark or a size is not told; empty where the camera does."""
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
     known = [max(size) for size in sizes if size is not None]
-    span = max(known) if known else UNKNOWN_SPAN_PX
-    angle, may_fly = _ramp_angle_rad(clip), not SCENARIOS[clip.scenario].has_surface
     try:
-        movers = find_movers(
-            open_frames, span, axes_angle_rad=angle, may_fly=may_fly, advance=advance
+        return find_movers(
+            open_frames,
+            max(known) if known else UNKNOWN_SPAN_PX,
+            axes_angle_rad=_ramp_angle_rad(clip),
+            may_fly=not SCENARIOS[clip.scenario].has_surface,
+            outlined=len(known) < len(sizes),
+            advance=advance,
         )
     except CameraMovesError as error:
+        if all(item.point_px is not None for item in clip.objects):
+            return []
         raise InputError(f"{clip.path}: objects: point_px: missing, and {error}") from None
+
+
+def _with_points(clip: Clip, movers: Sequence[Mover], open_frames: OpenFrames) -> Clip:
+    """The clip with a `point_px` for every object: those not declared go to what moves."""
+    missing = [item for item in clip.objects if item.point_px is None]
+    if not missing:
+        return clip
+    sizes = [outline_of(clip, item).size_px for item in clip.objects]
+    span = max([max(size) for size in sizes if size is not None], default=UNKNOWN_SPAN_PX)
     taken = [item.point_px for item in clip.objects if item.point_px is not None]
     movers = [m for m in movers if all(math.dist(m.point_px, point) > span for point in taken)]
-    missing = [item for item in clip.objects if item.point_px is None]
     if len(movers) < len(missing):
         name = missing[len(movers)].name
         raise InputError(
@@ -120,7 +163,7 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
     angle = _image_angle_rad(clip, item)
     scale = clip.pixels_per_metre
     if item.size_m is None or scale is None:
-        return Outline(None, angle)
+        return Outline(None, angle, is_round=item.shape != "box")
     radius, *others = item.size_m
     match item.shape:
         case "box":

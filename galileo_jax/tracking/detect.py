@@ -8,7 +8,7 @@ stands on something. Where no features move and nothing flies, it is the silhoue
 farthest.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points
+from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points, rigid_motion
 from galileo_jax.tracking.picture import OpenFrames, some_frames
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.silhouette import Path, differences, paths_of
@@ -36,8 +36,7 @@ MOST = 0.8
 """Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03  # share of the frame's width within which a thing counts as at the border
 RIM_POINTS = 64  # at which a disc's edge is looked at
-LEAST_TURNING, LEAST_OUTLINES = 3, 3
-"""Features that tell how a thing has turned; outlines of it that must be seen."""
+LEAST_OUTLINES = 3  # of a thing that must be seen
 LEAST_SEEN = 6  # frames in which a silhouette is followed: fewer may be linked by chance
 STRAY, LEAST_WAY = 0.03, 3.0
 """Of its way, by which what flies is off a parabola in time, and by more of which that is bent; how
@@ -55,6 +54,8 @@ class Mover:
     leaves_picture: bool  # whether its features were last seen going over the border
     # `[corner, 2]`, of its outline in that frame; where none was seen, its features
     places_px: np.ndarray
+    # `[frame, 2]`, how far it has gone since; NaN where it is not seen
+    way_px: np.ndarray
     goes_right: bool = True  # whether its features were last seen to the right of where they began
     first_frame: int = 0  # in which it is seen
     flies: bool = False  # whether nothing but its weight moves it
@@ -70,16 +71,17 @@ def find_movers(
     *,
     axes_angle_rad: float = 0.0,
     may_fly: bool = True,
+    outlined: bool = True,
     advance: Callable[[], None] = lambda: None,
 ) -> list[Mover]:
     """The things that move: what flies, what stays in the picture, the others; each by onset.
 
     Args:
-      open_frames: gives the frames; called three times, or once where features move and nothing
-        may fly.
+      open_frames: gives the frames; called up to three times.
       span_px: about the size of an object; features farther apart are linked by others only.
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
       may_fly: whether something may, which is looked for then.
+      outlined: whether outlines of what has features are looked for.
       advance: called after every frame.
 
     Raises:
@@ -97,7 +99,7 @@ def find_movers(
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     groups = _groups(path, onset, span_px)
     looks_on = may_fly or not groups
-    some = some_frames(open_frames, len(path)) if looks_on else {}
+    some = some_frames(open_frames, len(path)) if looks_on or outlined else {}
     ways = paths_of(open_frames, np.arange(len(path)), some) if looks_on else []
     ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
     flying = [
@@ -106,7 +108,7 @@ def find_movers(
         if _flies(one) and not any(_is_same(one, path[:, members]) for members in groups)
     ]
     movers, margin = [], BORDER_SHARE * size_px[0]
-    labels = differences(some) if some else {}
+    labels = differences(some) if outlined else {}
     for members, places in _with_outlines(path, onset, groups, labels):
         began, last = path[0, members], np.array([_last_seen(path[:, i]) for i in members])
         beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
@@ -117,6 +119,7 @@ def find_movers(
                 num_features=len(members),
                 leaves_picture=bool(np.mean(beyond.any(axis=1)) > 0.3),
                 places_px=places,
+                way_px=_medians(path[:, members] - began),
                 goes_right=bool(np.median(last[:, 0] - began[:, 0]) >= 0),
             )
         )
@@ -124,18 +127,20 @@ def find_movers(
         farthest = max(ways, key=lambda one: one.way_px, default=None)
         if farthest is None or farthest.way_px < farthest.parts[0].size_px:
             return []
-        return [_silhouette(farthest)]
-    movers += [_silhouette(one) for one in flying]
+        return [_silhouette(farthest, len(path))]
+    movers += [_silhouette(one, len(path)) for one in flying]
     return sorted(movers, key=lambda one: (not one.flies, one.leaves_picture, one.onset_frame))
 
 
-def _silhouette(path: Path) -> Mover:
+def _silhouette(path: Path, num_frames: int) -> Mover:
     first, frame = path.parts[0], path.frames[0]
     x, y = first.centre_px
     goes_right = bool(path.parts[-1].centre_px[0] >= x)
     corners = np.stack([first.low_px, first.high_px]).astype(float)
+    way = np.full((num_frames, 2), np.nan)
+    way[path.frames] = path.places_px - path.places_px[0]
     point = (float(x), float(y))
-    return Mover(point, frame, 0, False, corners, goes_right, frame, _flies(path))
+    return Mover(point, frame, 0, False, corners, way, goes_right, frame, _flies(path))
 
 
 def _flies(path: Path) -> bool:
@@ -161,7 +166,8 @@ def _with_outlines(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Groups of features, `[member]`, with the outlines of their things, `[corner, 2]`.
 
-    Those that set out with a thing from within its outline are of it.
+    Those that set out with a thing from within its outline are of it, unless they go away from it:
+    a hand that lets go sets out with what it held.
     """
     groups = sorted(groups, key=len, reverse=True)
     since = np.array([np.median(onset[members]) for members in groups])
@@ -170,7 +176,9 @@ def _with_outlines(
     for own, members in enumerate(groups):
         together = np.abs(since - since[own]) <= SAME_ONSET_FRAMES
         for first, (others, outline) in found.items():
-            if together[first] and _holds(outline, path[0, members]):
+            apart = np.linalg.norm(middles[own] - middles[first], axis=1)
+            stays = not (apart > np.hypot(*np.ptp(outline, axis=0))).any()  # NaN: not seen
+            if together[first] and stays and _holds(outline, path[0, members]):
                 found[first] = np.concatenate([others, members]), outline
                 break
         else:
@@ -192,30 +200,39 @@ def _outlined(
     `places`: of its features `[frame, feature, 2]`. `others`: of other things `[thing, frame, 2]`.
     `labels`: by frame, of the parts, `[height, width]`; 0: as in the first.
     """
-    began, found = places[0], []
+    began = places[0]
+    found: dict[str, list[np.ndarray]] = {"left": [], "reached": []}
     for frame, parts in labels.items():
         now = places[frame]
         seen = np.isfinite(now[:, 0])
-        if seen.sum() < LEAST_TURNING:
+        motion = rigid_motion(now[seen], began[seen])
+        if motion is None:
             continue
+        turn, shift = rotation(motion[0]).T, motion[1]
+        off = np.median(np.linalg.norm(now[seen] @ turn + shift - began[seen], axis=1))
         left, reached = (_part_at(parts, each[seen]) for each in (began, now))
-        back, off = _moved_back(now[seen], began[seen])
-        for end, part in ((began[seen], left), (now[seen], reached)):
-            if not part or left == reached or (part == reached and off > SAME_WAY_PX):
+        for kind, end, part in (("left", began[seen], left), ("reached", now[seen], reached)):
+            if not part or left == reached or (kind == "reached" and off > SAME_WAY_PX):
                 continue
             hull = _hull_of(parts == part)
             apart = np.linalg.norm(others[:, [0, frame]] - np.median(end, axis=0), axis=-1)
-            outline = hull if part == left else back(hull)
+            outline = hull if kind == "left" else hull @ turn + shift
             is_alone = not (apart < np.hypot(*np.ptp(hull, axis=0))).any()
             is_whole = (hull > 1).all() and (hull < np.array(parts.shape[::-1]) - 2).all()
             if is_alone and is_whole and _holds(outline, began):
                 # Its features are on it, also where it looks like what is behind.
-                found.append(_hull(np.concatenate([outline, began])))
-    if len(found) < LEAST_OUTLINES:
+                found[kind].append(_hull(np.concatenate([outline, began])))
+    if len(found["left"]) + len(found["reached"]) < LEAST_OUTLINES:
         return began
-    # What nobody follows, as a hand, may be in half of them, and makes these larger.
-    areas = [cv2.contourArea(outline.astype(np.float32)) for outline in found]
-    return found[int(np.argsort(areas)[len(areas) // 4])]
+    # What nobody follows, as a hand, may be in half of them, and makes these larger; where it held
+    # the thing at first, it is in all that show what has been left.
+    return _small([*found["reached"], *([_small(found["left"])] if found["left"] else [])])
+
+
+def _small(outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """Of outlines that which a quarter of them is smaller than."""
+    areas = [cv2.contourArea(outline.astype(np.float32)) for outline in outlines]
+    return outlines[int(np.argsort(areas)[len(areas) // 4])]
 
 
 def _medians(places: np.ndarray) -> np.ndarray:
@@ -252,24 +269,6 @@ def _holds(outline: np.ndarray, places: np.ndarray) -> bool:
     hull = _hull(outline).astype(np.float32)
     inside = [cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in places]
     return bool(np.mean(np.array(inside) > -SAME_WAY_PX) > MOST)
-
-
-def _moved_back(
-    now: np.ndarray, began: np.ndarray
-) -> tuple[Callable[[np.ndarray], np.ndarray], float]:
-    """The turn and shift of points that takes features from `now` to where they began.
-
-    And the median distance by which these are off then, px.
-    """
-    a, b = now @ (1, 1j), began @ (1, 1j)
-    turn = np.vdot(a - a.mean(), b - b.mean())
-    turn /= max(abs(turn), np.finfo(float).tiny)
-
-    def back(points: np.ndarray) -> np.ndarray:
-        moved = turn * (points @ (1, 1j) - a.mean()) + b.mean()
-        return np.stack([moved.real, moved.imag], axis=-1)
-
-    return back, float(np.median(np.hypot(*(back(now) - began).T)))
 
 
 def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:
