@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.api.diagnose import Diagnosis, diagnose
-from galileo_jax.api.next_experiment import rehearsed
-from galileo_jax.experiment.choose import LITTLE
+from galileo_jax.experiment.choose import LITTLE, best_first, expect
+from galileo_jax.experiment.hypothesis_probabilities import beliefs_of
 from galileo_jax.experiment.journal import Journal, law_row, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of, write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
@@ -263,20 +263,21 @@ class _Loop:
             )
         if found is None:  # begun again after the budget was spent
             found = self.diagnosed()
+        clip, beliefs = found.measurements[0].clip, beliefs_of(found.found)
         try:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
-                ahead = rehearsed(found, settings, journal.seed)
+                ahead = expect(clip, found.problem, beliefs, settings, None, journal.seed)
         except InputError as error:  # of scenes that nobody can set up here
             said = f"not simulated ({_line(error)}): as different as possible from those so far"
             return farthest(self.can, settings, tried), said
-        best = ahead.expected[0]
-        journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)
+        best = best_first(ahead)[0]
+        journal.rounds[-1]["hypotheses"] = beliefs.by_name
         if best.gain_nats < LITTLE:
             return farthest(self.can, settings, tried), (
                 f"no setting is expected to gain more than {best.gain_nats:.2f} nats: as different "
                 "as possible from those so far, to see whether the verdict holds"
             )
-        odds = ", ".join(f"{name} {p:.2f}" for name, p in list(ahead.hypotheses.items())[:3])
+        odds = ", ".join(f"{name} {p:.2f}" for name, p in list(beliefs.by_name.items())[:3])
         return dict(best.setting), (
             f"largest expected gain: {best.gain_nats:.2f} nats; the true hypothesis is then named "
             f"with probability {best.named:.2f}; so far: {odds}"

@@ -141,50 +141,22 @@ def next_experiment(
         allowed = parsed or parse_can(default_can(clip, trials))
         settings = grid(allowed, seed)
         with progress.part(DIAGNOSED, 1.0):
-            rows = expect(clip, trials, beliefs, settings, about, seed)
+            rows = best_first(expect(clip, trials, beliefs, settings, about, seed))
         progress.report("rehearsed", 1.0)
-    made = make_next(rows, beliefs, about)
     document = {
         "clips": sources,
-        "can": {name: _as_json(kind) for name, kind in allowed.items()},
-        **made.document,
+        "can": {name: kind.document for name, kind in allowed.items()},
+        "about": about,
+        "hypotheses": beliefs.by_name,
+        "sentence": sentence_of(rows[0], about),
+        "settings": [
+            {**one.setting, **{key: getattr(one, key) for key in NUMBERS}} for one in rows
+        ],
         "timings_s": {"next": round(time.perf_counter() - began, 3)},
         "version": __version__,
         "seed": seed,
     }
-    return NextExperiment(made.expected, about, made.hypotheses, document)
-
-
-def rehearsed(
-    found: Diagnosis, settings: Sequence[Mapping[str, Any]], seed: int = 0
-) -> NextExperiment:
-    """What is expected of these settings after a diagnosis; the document is of them alone."""
-    beliefs = beliefs_of(found.found)
-    rows = expect(found.measurements[0].clip, found.problem, beliefs, settings, None, seed)
-    return make_next(rows, beliefs)
-
-
-def make_next(
-    rows: Sequence[Expected], beliefs: Beliefs, about: str | None = None
-) -> NextExperiment:
-    """The result, the most telling setting first."""
-    ordered = best_first(rows)
-    shares = zip(beliefs.of, beliefs.probability, strict=True)
-    hypotheses = {one.name: float(p) for one, p in shares}
-    settings = [{**one.setting, **{key: getattr(one, key) for key in NUMBERS}} for one in ordered]
-    document = {
-        "about": about,
-        "hypotheses": hypotheses,
-        "sentence": sentence_of(ordered[0], about),
-        "settings": settings,
-    }
-    return NextExperiment(ordered, about, hypotheses, document)
-
-
-def _as_json(kind: Any) -> dict[str, Any]:
-    if hasattr(kind, "values"):
-        return {"choices": list(kind.values)}
-    return {"low": kind.low, "high": kind.high}
+    return NextExperiment(rows, about, beliefs.by_name, document)
 
 
 def _loaded(

@@ -64,6 +64,12 @@ class Beliefs:
         """`[hypothesis]`, among these."""
         return softmax([belief.log_odds for belief in self.of])
 
+    @property
+    def by_name(self) -> dict[str, float]:
+        """The probabilities by the hypotheses' names."""
+        shares = zip(self.of, self.probability, strict=True)
+        return {one.name: float(share) for one, share in shares}
+
 
 def beliefs_of(found: Diagnosis) -> Beliefs:
     """The hypotheses of a diagnosis that are still possible, at most `MOST`.

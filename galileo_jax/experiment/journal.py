@@ -48,13 +48,12 @@ class Journal:
         """The last verdict."""
         return self.rounds[-1] if self.rounds else None
 
-    def add(self, settings: dict[str, Any], reason: str) -> dict[str, Any]:
+    def add(self, settings: dict[str, Any], reason: str) -> None:
         """Writes down that an experiment is to be made, and why."""
         number = len(self.experiments) + 1
         row = {"number": number, "settings": settings, "reason": reason}
         self.experiments.append(row | {"outcome": None, "line": None, "clip": None})
         self.write()
-        return self.experiments[-1]
 
     def close(self, row: dict[str, Any], *, clip: str | None = None, line: str = "") -> None:
         """Writes down what became of an experiment."""

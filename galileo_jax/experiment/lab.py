@@ -30,7 +30,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.clip.yaml_file import yaml_text
-from galileo_jax.experiment.settings import Can, Choices, known_as, parse_can
+from galileo_jax.experiment.settings import Can, known_as, parse_can
 from galileo_jax.observation.digest import digest
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
@@ -64,12 +64,7 @@ class Described:
     @property
     def document(self) -> dict[str, Any]:
         """As JSON, in the lab's own form."""
-        settings = {
-            name: {"choices": list(kind.values)}
-            if isinstance(kind, Choices)
-            else {"low": kind.low, "high": kind.high}
-            for name, kind in self.can.items()
-        }
+        settings = {name: kind.document for name, kind in self.can.items()}
         return {"settings": settings, "clip": dict(self.clip)}
 
 

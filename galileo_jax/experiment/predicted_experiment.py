@@ -12,13 +12,13 @@ rest, and tell nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.experiment.hypothesis_probabilities import Belief
-from galileo_jax.experiment.proposal import Proposal, seen_as
+from galileo_jax.experiment.proposal import Proposal
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.numerics.normal_matrix import symmetric_root
 
@@ -59,8 +59,9 @@ def predict_experiment(
     problem = proposal.problem
     theta = np.concatenate([rows for _, rows, _ in drawn])
     seen = problem.simulate_batch(theta)
-    middle = seen[0]  # what the first hypothesis has for most likely
-    noisy = seen_as(problem, middle)
+    # Seen is what the first hypothesis has for most likely.
+    observed = replace(problem.observation, position_m=seen[0])
+    noisy = replace(problem, observation=observed)
     white = -noisy.whiten(seen, 1.0).reshape(len(beliefs), NUM_DRAWS + 1, -1)
     gone = np.ptp(seen[:, 1:, 0], axis=-1).max(axis=1, initial=0.0)
     hits = (gone > MOVED_M).reshape(len(beliefs), -1)

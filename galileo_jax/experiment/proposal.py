@@ -6,7 +6,7 @@ how far up the ramp object 1 is released, the errors of a frame.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -74,7 +74,8 @@ def propose(
     pairs = [(f"{kind}{i}", f"{kind}{3 - i}") for kind in "mk" for i in (1, 2)]
     fixed = {f"m{i}": float(given[f"mass{i}"]) for i in (1, 2) if f"mass{i}" in given}
     renamed = dict(pairs) if is_swapped else {}
-    return Proposal(problem, renamed, {_place(n, is_swapped): v for n, v in fixed.items()})
+    # mass1 is that of object 1 wherever it stands.
+    return Proposal(problem, renamed, {renamed.get(n, n): v for n, v in fixed.items()})
 
 
 def release_m(clip: Clip, problem: Problem) -> float:
@@ -89,11 +90,6 @@ def height_m(clip: Clip, problem: Problem) -> float:
     if not SCENARIOS[clip.scenario].has_ramp:
         return problem.model.scene.surroundings.start_m[0][1]
     return release_m(clip, problem) * math.sin(math.radians(clip.ramp_angle_deg or 90.0))
-
-
-def _place(name: str, is_swapped: bool) -> str:
-    """The name of a mass in the new scene; mass1 is that of object 1 wherever it stands."""
-    return {"m1": "m2", "m2": "m1"}[name] if is_swapped else name
 
 
 def _check(clip: Clip, given: Setting) -> None:
@@ -163,8 +159,3 @@ def _observation(
         covariance_m2=np.repeat(covariance[order][..., None], len(times), axis=3),
         mask=np.ones((count, len(times)), bool),
     )
-
-
-def seen_as(problem: Problem, position_m: np.ndarray) -> Problem:
-    """The problem with an observation of these places, `[object, 2, frame]`."""
-    return replace(problem, observation=replace(problem.observation, position_m=position_m))

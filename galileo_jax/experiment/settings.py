@@ -66,6 +66,11 @@ class Range:
         """Of the range."""
         return float(f"{(self.low + self.high) / 2:.4g}")
 
+    @property
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {"low": self.low, "high": self.high}
+
 
 @dataclass(frozen=True)
 class Choices:
@@ -89,6 +94,11 @@ class Choices:
     def middle(self) -> Any:
         """The one in the middle."""
         return self.values[(len(self.values) - 1) // 2]
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """As JSON."""
+        return {"choices": list(self.values)}
 
 
 Can = Mapping[str, Range | Choices]

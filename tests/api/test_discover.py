@@ -73,16 +73,20 @@ def verdicts(monkeypatch):
             verdict=Verdict(status, effects, law=law),
             sentence=f"it is {status}",
             document={"p_value": 0.5},
+            found=None,
+            problem=None,
+            measurements=[types.SimpleNamespace(clip=None)],
             save=lambda folder: folder.mkdir(exist_ok=True),
         )
 
-    def rehearsed(found, settings, seed):
-        rows = [Expected(one, one["height_m"], 0.9, 1.0, None) for one in settings]
-        rows.sort(key=lambda one: -one.gain_nats)
-        return types.SimpleNamespace(expected=rows, hypotheses={"air_drag": 0.6, "rolling": 0.4})
+    def expect(clip, trials, beliefs, settings, about, seed):
+        return [Expected(one, one["height_m"], 0.9, 1.0, None) for one in settings]
+
+    beliefs = types.SimpleNamespace(by_name={"air_drag": 0.6, "rolling": 0.4})
 
     monkeypatch.setattr(module, "diagnose", diagnose)
-    monkeypatch.setattr(module, "rehearsed", rehearsed)
+    monkeypatch.setattr(module, "expect", expect)
+    monkeypatch.setattr(module, "beliefs_of", lambda _: beliefs)
     return given
 
 
@@ -230,7 +234,7 @@ def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
     def refuse(*_):
         raise InputError("--can: height has no place in scenario spring")
 
-    monkeypatch.setattr(module, "rehearsed", refuse)
+    monkeypatch.setattr(module, "expect", refuse)
     lab = Lab()
     found = gx.discover(lab, budget=3)
     assert "not simulated (--can: height has no place" in found.experiments["reason"][1]
