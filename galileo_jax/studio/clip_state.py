@@ -11,6 +11,7 @@ from galileo_jax.api.label import label
 from galileo_jax.api.understand import is_declared
 from galileo_jax.clip.label import updated_file
 from galileo_jax.clip.load import check_clip
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
@@ -114,20 +115,22 @@ class Sheet(Opened):
         return self.yaml.is_file() and all(one.kind != "missing" for one in self.remarks)
 
 
-def opened(root: Path, video: Path, store: Store) -> Sheet:
-    """A clip as it was left: its yaml, and the marks that were drawn for it.
+def opened(root: Path, source: Path, store: Store) -> Sheet | Table:
+    """A clip as it was left: of a film its yaml, and the marks that were drawn for it.
 
     Raises:
-      InputError: the video does not decode, or the yaml names a file outside the folder.
+      InputError: the film does not decode, or the yaml names a file outside the folder.
     """
-    info = probe(video)
-    path = video.with_suffix(".yaml")
-    text = _read(path)
+    path = source.with_suffix(".yaml")
     content = yaml_content(path)
-    check_declared(root, video.parent, content)
-    kept = stored(store.get("clips", video.stem))
+    check_declared(root, source.parent, content)
+    if is_track(source):
+        return Table(root, source)
+    info = probe(source)
+    text = _read(path)
+    kept = stored(store.get("clips", source.stem))
     if kept is not None and kept.present.yaml == text:
-        return Sheet(root, video, info, kept)
+        return Sheet(root, source, info, kept)
     fps = info.container_fps or 30.0
     problem = None
     if text is not None:
@@ -135,21 +138,11 @@ def opened(root: Path, video: Path, store: Store) -> Sheet:
             found = Step(declared(content, info.size_px, fps), text)
             # Somebody else has written it meanwhile.
             before = () if kept is None else (*kept.past, kept.present)
-            return Sheet(root, video, info, History(found, before))
+            return Sheet(root, source, info, History(found, before))
         except (KeyError, TypeError, ValueError, IndexError):
             problem = _problem_of(path)
     empty = Step(blank(fps, info.size_px), text, problem)
-    return Sheet(root, video, info, History(empty), is_drawn=text is not None)
-
-
-def opened_table(root: Path, source: Path) -> Table:
-    """A table.
-
-    Raises:
-      InputError: its yaml names a file outside the folder.
-    """
-    check_declared(root, source.parent, yaml_content(source.with_suffix(".yaml")))
-    return Table(root, source)
+    return Sheet(root, source, info, History(empty), is_drawn=text is not None)
 
 
 def changed(sheet: Sheet, marks: Marks, store: Store) -> Sheet:

@@ -5,17 +5,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.studio.clip_state import (
-    Sheet,
-    Table,
-    changed,
-    opened,
-    opened_table,
-    redone,
-    undone,
-)
+from galileo_jax.studio.clip_state import Sheet, Table, changed, opened, redone, undone
 from galileo_jax.studio.frames import Frames
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.paths import tables, videos
@@ -59,10 +50,7 @@ class Clips:
         path = self._unopened.pop(name, None)
         if path is not None:
             try:
-                if is_track(path):
-                    self.sheets[name] = opened_table(self.root, path)
-                else:
-                    self.sheets[name] = opened(self.root, path, self.store)
+                self.sheets[name] = opened(self.root, path, self.store)
                 self.broken.pop(name, None)
             except InputError as error:
                 self.broken[name] = str(error).replace(f"{path}: ", "")

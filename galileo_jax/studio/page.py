@@ -91,22 +91,21 @@ class _Page:
         self.show()
 
     def _on_moved(self, event: Any) -> None:
-        sheet, given = self._session.sheet, event.args
-        if sheet is not None:
-            self._tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
+        given = event.args
+        self._tab.edit(moved, given["handle"], (given["x"], given["y"]))
 
     def _on_place(self, event: Any) -> None:
-        tab, sheet = self._tab, self._session.sheet
-        if sheet is None or not tab.placing:
+        tab = self._tab
+        if self._session.sheet is None or not tab.placing:
             return
         (x, y, frame), name, tab.placing = event.args, tab.placing, ""
         if name == explain.POINTS:
             self._session.say(name, f"{x:.0f} {y:.0f}")
             self.show()
         elif name == marks.NEW:
-            tab.mark(with_object(sheet.marks, (x, y)))
+            tab.edit(with_object, (x, y))
         else:
-            tab.mark(corrected(sheet.marks, name, int(frame), (x, y)))
+            tab.edit(corrected, name, int(frame), (x, y))
             self._session.track()
 
     def show(self) -> None:

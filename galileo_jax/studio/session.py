@@ -12,11 +12,7 @@ from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
-from galileo_jax.studio.clip_state import (
-    Sheet,
-    Table,
-    changed,
-)
+from galileo_jax.studio.clip_state import Sheet, Table, changed
 from galileo_jax.studio.clips import Clips
 from galileo_jax.studio.jobs import Job, Message, Worker
 from galileo_jax.studio.marks_yaml import proposed

@@ -69,10 +69,14 @@ class Tab:
         self.session.mark(marks)
         self.redraw()
 
+    def edit(self, change: Callable[..., Marks], *given: Any, **more: Any) -> None:
+        """Draws the active clip's marks as `change(marks, *given, **more)` makes them."""
+        if self.session.sheet is not None:
+            self.mark(change(self.session.sheet.marks, *given, **more))
+
     def change(self, **given: Any) -> None:
         """Draws the active clip's marks with other values."""
-        if self.session.sheet is not None:
-            self.mark(replace(self.session.sheet.marks, **given))
+        self.edit(replace, **given)
 
     def place(self, what: str) -> None:
         """What the next click into the video places; once more: nothing."""

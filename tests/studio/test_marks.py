@@ -7,7 +7,16 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import remarks_on
-from galileo_jax.studio.clip_state import History, Step, changed, opened, redone, stored, undone
+from galileo_jax.studio.clip_state import (
+    History,
+    Sheet,
+    Step,
+    changed,
+    opened,
+    redone,
+    stored,
+    undone,
+)
 from galileo_jax.studio.marks import (
     CORNERS,
     Marks,
@@ -34,6 +43,12 @@ def after_json(marks: Marks) -> Marks | None:
     """As they come back from the studio's file."""
     kept = stored(json.loads(json.dumps(asdict(History(Step(marks, ""))))))
     return None if kept is None else kept.present.marks
+
+
+def film_of(root, video, store) -> Sheet:
+    sheet = opened(root, video, store)
+    assert isinstance(sheet, Sheet)
+    return sheet
 
 
 def apart(one, other) -> float:
@@ -123,13 +138,13 @@ def test_each_step_is_on_disk_and_can_be_undone_to_the_letter(tmp_path):
     video = clip_in(tmp_path)
     text = video.with_suffix(".yaml").read_text()
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     assert sheet.is_complete
     x, y = sheet.marks.objects[0].point or (0.0, 0.0)
     sheet = changed(sheet, moved(sheet.marks, "object1", (x + 1, y)), store)
     assert gx.load(video).objects[0].point_px == (x + 1, y)
-    assert opened(tmp_path, video, Store(tmp_path)) == sheet, "a new server sees the same"
-    sheet = undone(opened(tmp_path, video, Store(tmp_path)), store)
+    assert film_of(tmp_path, video, Store(tmp_path)) == sheet, "a new server sees the same"
+    sheet = undone(film_of(tmp_path, video, Store(tmp_path)), store)
     assert video.with_suffix(".yaml").read_text() == text
     sheet = redone(sheet, store)
     assert gx.load(video).objects[0].point_px == (x + 1, y)
@@ -140,13 +155,13 @@ def test_marks_that_cannot_be_are_kept_and_explained_but_not_written(tmp_path):
     video = clip_in(tmp_path)
     text = video.with_suffix(".yaml").read_text()
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     good = sheet.marks
     sheet = changed(sheet, moved(good, "foot", (150.0, 20.0)), store)
     assert video.with_suffix(".yaml").read_text() == text
     assert not sheet.is_complete
     assert "inside" in (sheet.history.present.problem or "")
-    again = opened(tmp_path, video, Store(tmp_path))
+    again = film_of(tmp_path, video, Store(tmp_path))
     assert again.marks == sheet.marks, "what was drawn is not lost"
     mended = changed(again, good, store)
     assert mended.history.present.problem is None and mended.is_complete
@@ -156,10 +171,10 @@ def test_marks_that_cannot_be_are_kept_and_explained_but_not_written(tmp_path):
 def test_an_edit_by_another_program_is_taken_over(tmp_path):
     video = clip_in(tmp_path)
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     changed(sheet, moved(sheet.marks, "object1", (50.0, 50.0)), store)
     gx.label(video, fps=60.0)
-    again = opened(tmp_path, video, Store(tmp_path))
+    again = film_of(tmp_path, video, Store(tmp_path))
     assert again.marks.fps == 60.0
     assert math.isclose(undone(again, store).marks.fps, sheet.marks.fps)
 
@@ -168,7 +183,7 @@ def test_an_edit_by_another_program_is_taken_over(tmp_path):
 def test_an_object_can_be_taken_out_again(tmp_path):
     video = clip_in(tmp_path)
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     sheet = changed(sheet, without_object(sheet.marks, "object2"), store)
     assert [one.name for one in gx.load(video).objects] == ["object1"]
 
@@ -177,7 +192,7 @@ def test_an_object_can_be_taken_out_again(tmp_path):
 def test_what_depends_on_a_change_is_stale_and_nothing_else(tmp_path):
     video = clip_in(tmp_path)
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     folder = track_files(sheet)
     folder.mkdir()
     (folder / "track_px.csv").write_text("time_s\n")
@@ -201,7 +216,7 @@ def test_what_depends_on_a_change_is_stale_and_nothing_else(tmp_path):
 def test_a_bare_video_gets_a_proposal_that_lacks_only_the_scale(tmp_path):
     video = clip_in(tmp_path, is_bare=True)
     store = Store(tmp_path)
-    sheet = opened(tmp_path, video, store)
+    sheet = film_of(tmp_path, video, store)
     assert not sheet.is_drawn and not sheet.is_complete
     truth = gx.load(clip_in(tmp_path, "known"))
     sheet = changed(sheet, proposed(asdict(gx.propose(video)), sheet.info.size_px), store)

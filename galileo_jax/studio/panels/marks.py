@@ -117,12 +117,14 @@ def _object(tab: Tab, one: ObjectMark) -> Any:
         ui.label(name).style("font-weight: 600; min-width: 68px")
         shape = ui.select(list(SIZE_MEANING), value=one.shape).props("outlined dense options-dense")
         shape.style("min-width: 96px")
-        shape.on_value_change(lambda event: _change(tab, name, shape=event.value, size_m=None))
+        shape.on_value_change(
+            lambda event: tab.edit(with_other, name, shape=event.value, size_m=None)
+        )
         size = ui.input(label="size, m", value=_text(one.size_m), placeholder="if known")
         meaning = f"{SIZE_MEANING[one.shape]}, m"
         size.props(f'outlined dense title="{meaning}" data-size={name}').style("flex: 1")
         parts.on_entered(size, lambda text: _size(tab, name, text))
-        parts.icon_button("close", f"Remove {name}", partial(_drop, tab, name))
+        parts.icon_button("close", f"Remove {name}", partial(tab.edit, without_object, name))
     return size
 
 
@@ -133,14 +135,4 @@ def _size(tab: Tab, name: str, text: str) -> None:
         tab.session.error = f"{name}: {text[:30]!r} is not a size; metres expected"
         tab.redraw()
         return
-    _change(tab, name, size_m=size or None)
-
-
-def _change(tab: Tab, name: str, **given: Any) -> None:
-    if tab.session.sheet is not None:
-        tab.mark(with_other(tab.session.sheet.marks, name, **given))
-
-
-def _drop(tab: Tab, name: str) -> None:
-    if tab.session.sheet is not None:
-        tab.mark(without_object(tab.session.sheet.marks, name))
+    tab.edit(with_other, name, size_m=size or None)

@@ -68,10 +68,5 @@ def _put_right(tab: Tab, marks: Marks) -> None:
         for frame, _, _ in one.corrections:
             with parts.row():
                 ui.label(f"{one.name} was corrected in frame {frame}").classes("soft")
-                back = partial(_take_back, tab, one.name, frame)
+                back = partial(tab.edit, corrected, one.name, frame, None)
                 parts.icon_button("close", f"Take back frame {frame} of {one.name}", back)
-
-
-def _take_back(tab: Tab, name: str, frame: int) -> None:
-    if tab.session.sheet is not None:
-        tab.mark(corrected(tab.session.sheet.marks, name, frame, None))
