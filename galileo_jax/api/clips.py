@@ -69,7 +69,8 @@ def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
 
 
 def as_list(given: Any) -> list[Any]:
-    """One thing or several, as a list; a path or a mapping is one thing."""
-    if isinstance(given, Sequence) and not isinstance(given, str):
-        return list(given)
-    return [given]
+    """One clip or several, as a list; a path or a mapping is one. Refuses none."""
+    found = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    if not found:
+        raise InputError("no clip given; at least one expected")
+    return found

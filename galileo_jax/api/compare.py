@@ -82,7 +82,7 @@ class Comparison:
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
-        write_comparison_page(
+        return write_comparison_page(
             Path(path),
             ", ".join(self.fit.names),
             self.document,
@@ -92,7 +92,6 @@ class Comparison:
             is_adequate=self.is_adequate,
             command=self.command,
         )
-        return Path(path)
 
     def save(self, folder: str | Path) -> Path:
         """Writes compare.json and report.html into a folder."""

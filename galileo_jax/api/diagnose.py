@@ -223,7 +223,7 @@ class Diagnosis:
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
         clips = [one.clip for one in self.measurements]
-        write_diagnosis_page(
+        return write_diagnosis_page(
             Path(path),
             ", ".join(one.name for one in self.measurements),
             self.document,
@@ -234,7 +234,6 @@ class Diagnosis:
             command=self.command,
             next_command=self.next_command(Path(path).parent),
         )
-        return Path(path)
 
     @in_float64
     def save(self, folder: str | Path, *, svg: bool = False) -> Path:

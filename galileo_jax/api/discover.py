@@ -74,8 +74,7 @@ class Discovery:
 
     def report(self, path: str | Path) -> Path:
         """Writes the page: one HTML file, no network needed."""
-        write_discovery_page(Path(path), self.document, self.sentence)
-        return Path(path)
+        return write_discovery_page(Path(path), self.document, self.sentence)
 
     def __repr__(self) -> str:
         return f"<Discovery: {self.sentence}>"

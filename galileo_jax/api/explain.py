@@ -217,11 +217,8 @@ def explain(
 
 def sources_of(clips: ClipLike | Sequence[ClipLike]) -> list[ClipLike]:
     """The clips of a call; of a folder all in it, in the order of their names."""
-    given = as_list(clips)
-    if not given:
-        raise InputError("no clip given; at least one expected")
     found: list[ClipLike] = []
-    for one in given:
+    for one in as_list(clips):
         is_folder = isinstance(one, str | Path) and Path(one).is_dir()
         found += _in_folder(Path(one)) if is_folder else [one]
     return found

@@ -76,8 +76,7 @@ class NextExperiment:
 
     def report(self, path: str | Path) -> Path:
         """Writes the page: one HTML file, no network needed."""
-        write_next_page(Path(path), self.document)
-        return Path(path)
+        return write_next_page(Path(path), self.document)
 
     def save(self, folder: str | Path) -> Path:
         """Writes next.json and next.html into `folder`."""

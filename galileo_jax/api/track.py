@@ -219,8 +219,6 @@ def as_measurements(
       compile_for: see `precompiling`, which goes on beside what is to be tracked.
     """
     given = as_list(tracks)
-    if not given:
-        raise InputError("no clip given; at least one expected")
     clips = [
         as_clip(one.clip if isinstance(one, Track) else one, pixels_per_metre) for one in given
     ]

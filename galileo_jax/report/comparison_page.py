@@ -41,8 +41,8 @@ def write_comparison_page(
     *,
     is_adequate: bool,
     command: str,
-) -> None:
-    """Writes the page.
+) -> Path:
+    """Writes the page and returns its path.
 
     `record`: compare.json. `paths`: the objects' along their paths. `model`: with its parameters,
     as for `motion`. `command` makes the page again.
@@ -58,7 +58,7 @@ def write_comparison_page(
     ]
     more = f"{html.prose(left)}\n{pulls}\n{effects}"
     lead = diagnosis_text.adequacy(record)
-    html.write_page(path, "comparison", title, lead, sections, more, is_adequate)
+    return html.write_page(path, "comparison", title, lead, sections, more, is_adequate)
 
 
 def engine_and_seed(record: Mapping[str, Any]) -> dict[str, str]:

@@ -52,8 +52,8 @@ def write_diagnosis_page(
     truth: str | None,
     command: str,
     next_command: str,
-) -> None:
-    """Writes the page; each figure in it can be saved as SVG.
+) -> Path:
+    """Writes the page and returns its path; each figure in it can be saved as SVG.
 
     Args:
       path: where to.
@@ -89,7 +89,7 @@ def write_diagnosis_page(
     go_on = f'<p class="soft">Next: {html.code(next_command)}</p>'
     more = "\n".join([hidden, html.items(verdict["advice"]), go_on])
     is_good = verdict["status"] != "unknown"
-    html.write_page(path, "diagnosis", title, record["sentence"], sections, more, is_good)
+    return html.write_page(path, "diagnosis", title, record["sentence"], sections, more, is_good)
 
 
 def before_after_charts(

@@ -12,8 +12,8 @@ from galileo_jax.report.chart import Chart, Panel, Points
 NUM_ROWS = 20
 
 
-def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
-    """Writes the page of next.json."""
+def write_next_page(path: Path, record: Mapping[str, Any]) -> Path:
+    """Writes the page of next.json and returns its path."""
     names = _names(record)
     about = record["about"] or "which hypothesis holds"
     odds = [f"{name}: {share:.3f}" for name, share in record["hypotheses"].items()]
@@ -40,7 +40,7 @@ def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
         html.section("Settings", html.table(head, rows), html.prose(note, "soft")),
     ]
     title = ", ".join(Path(clip).stem for clip in record["clips"])
-    html.write_page(path, "next experiment", title, str(record["sentence"]), sections)
+    return html.write_page(path, "next experiment", title, str(record["sentence"]), sections)
 
 
 def gains_chart(record: Mapping[str, Any]) -> Chart:
@@ -63,8 +63,8 @@ def gains_chart(record: Mapping[str, Any]) -> Chart:
     return Chart("gains", label, tuple(panels))
 
 
-def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -> None:
-    """Writes the page of discover.json."""
+def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -> Path:
+    """Writes the page of discover.json and returns its path."""
     names = list(record["lab"]["settings"])
     experiments = [
         [
@@ -94,7 +94,7 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
     ended = html.prose(f"{record['ended']}.") if record["ended"] else ""
     is_good = bool(record["rounds"]) and record["rounds"][-1]["status"] in ("named", "none", "law")
     title = path.parent.name or "lab"
-    html.write_page(path, "discovery", title, sentence, sections, ended, is_good)
+    return html.write_page(path, "discovery", title, sentence, sections, ended, is_good)
 
 
 def _what(one: Mapping[str, Any]) -> str:

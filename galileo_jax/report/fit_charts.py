@@ -1,15 +1,19 @@
-"""Charts of a fit: velocities and positions, measured and fitted, and the residuals."""
+"""Charts of a fit: velocities and positions, residuals, and the posterior's draws."""
 
+import re
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from galileo_jax.comparison.path_residuals import Interval, worst_interval
 from galileo_jax.comparison.phases import Phase
+from galileo_jax.inference.posterior import Posterior
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.chart import (
     Band,
+    Bars,
     Chart,
     Line,
     Panel,
@@ -19,12 +23,16 @@ from galileo_jax.report.chart import (
     time_limits,
     with_room,
 )
-from galileo_jax.report.style import object_colour
+from galileo_jax.report.style import OBJECTS, object_colour
 
 Quantity = Literal["velocity", "position"]
 PER = {"velocity": "/s", "position": ""}
 FAILS_Z = 5.0  # of white noise, the largest of four tracks of 120 frames is over 4.6 in 1 of 100
 SMALLEST_RANGE = 3.3  # of the residuals' axis, in units of the noise
+NUM_PAIRS, NUM_TRACE = 800, 400  # draws in a panel, of a chain
+NUM_BINS = 30
+PAIR_PX, TRACE_PX = 88, 90  # heights of panels
+CHAIN_COLOURS = (*OBJECTS, "ink")
 
 
 def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval] | None:
@@ -171,3 +179,60 @@ def _limits(values: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
     span = np.ptp(values[known])
     spare = max(0.1 * span, min(3 * float(np.median(noise[known])), max(0.5 * span, 1e-3)))
     return float(values[known].min() - spare), float(values[known].max() + spare)
+
+
+def _main_draws(posterior: Posterior, names: list[str]) -> dict[str, np.ndarray]:
+    """`[chain, draw]` by name: the given parameters and the ratios of neighbours' masses."""
+    shown = {name: posterior[name] for name in names}
+    masses = [name for name in names if re.fullmatch(r"m\d+", name)]
+    ratios = {f"{a} / {b}": posterior[a] / posterior[b] for a, b in pairwise(masses)}
+    return shown | ratios
+
+
+def pair_chart(posterior: Posterior, names: list[str]) -> Chart:
+    """Every pair of the main parameters; on the diagonal each one's histogram."""
+    columns = {key: value.reshape(-1) for key, value in _main_draws(posterior, names).items()}
+    panels = []
+    for row, y_name in enumerate(columns):
+        for column, x_name in enumerate(columns):
+            if column > row:
+                panels.append(None)
+                continue
+            x, y = columns[x_name], columns[y_name]
+            stride = max(1, x.size // NUM_PAIRS)
+            mark = _histogram(x_name, x)
+            if row != column:
+                mark = Points(x[::stride], y[::stride], "object2", f"{x_name}, {y_name}",
+                              size_px=3, opacity=0.35)  # fmt: skip
+            panels.append(
+                Panel(
+                    ylabel=y_name if column == 0 and row > 0 else "",
+                    marks=(mark,),
+                    xlabel=x_name if row == len(columns) - 1 else "",
+                    has_y_ticks=column == 0 and row > 0,
+                )
+            )
+    label = "draws of the posterior, pairs of parameters"
+    return Chart("pairs", label, tuple(panels), columns=len(columns), panel_px=PAIR_PX)
+
+
+def _histogram(name: str, values: np.ndarray) -> Bars:
+    bins = NUM_BINS if np.ptp(values) > 1e-6 * np.abs(values).max() else 1  # a stuck chain
+    counts, edges = np.histogram(values, bins)
+    width = float(edges[1] - edges[0])
+    return Bars(edges[:-1] + width / 2, counts, "object2", name, width, opacity=0.75)
+
+
+def trace_chart(posterior: Posterior, names: list[str]) -> Chart:
+    """The main parameters of every chain, draw by draw."""
+    panels = []
+    for name, chains in _main_draws(posterior, names).items():
+        index = np.arange(chains.shape[1])[:: max(1, chains.shape[1] // NUM_TRACE)]
+        lines = tuple(
+            Line(index, chain[index], CHAIN_COLOURS[i % len(CHAIN_COLOURS)], f"chain {i + 1}",
+                 width_px=0.7, opacity=0.6)
+            for i, chain in enumerate(chains)
+        )  # fmt: skip
+        panels.append(Panel(name, lines, xlabel="draw"))
+    label = "draws of the posterior against their number, chain by chain"
+    return stacked("trace", label, panels, panel_px=TRACE_PX)

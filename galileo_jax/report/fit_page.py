@@ -16,11 +16,12 @@ from galileo_jax.report.chart import Chart
 from galileo_jax.report.fit_charts import (
     axes_of,
     failing_interval_of,
+    pair_chart,
     profile_chart,
     residual_chart,
+    trace_chart,
 )
 from galileo_jax.report.fit_text import meaning
-from galileo_jax.report.posterior_charts import pair_chart, trace_chart
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run

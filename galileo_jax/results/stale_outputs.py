@@ -21,14 +21,11 @@ TRACKS = "tracks"  # key of those documents: the digests of what they were made 
 RUN_FILES = ("clip.yaml", "observation.csv", "errors.npz", "report.html")
 
 
-def remove_stale_prediction(folder: Path) -> bool:
-    """Removes what `predict` wrote of the fit that lay in `folder`; returns whether it had."""
-    found = document(folder / PREDICTION)
-    if not found.keys() >= PREDICTION_KEYS:
-        return False
-    for name in (PREDICTION, *PICTURES):
-        (folder / name).unlink(missing_ok=True)
-    return True
+def remove_stale_prediction(folder: Path) -> None:
+    """Removes what `predict` wrote of the fit that lay in `folder`."""
+    if document(folder / PREDICTION).keys() >= PREDICTION_KEYS:
+        for name in (PREDICTION, *PICTURES):
+            (folder / name).unlink(missing_ok=True)
 
 
 def remove_single_clip_run(folder: Path) -> None:

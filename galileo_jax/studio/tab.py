@@ -76,7 +76,7 @@ class Tab:
 
     def change(self, **given: Any) -> None:
         """Draws the active clip's marks with other values."""
-        self.edit(replace, **given)
+        self.edit(lambda marks: replace(marks, **given))
 
     def place(self, what: str) -> None:
         """What the next click into the video places; once more: nothing."""
