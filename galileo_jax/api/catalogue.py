@@ -2,7 +2,7 @@
 
 import inspect
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -27,7 +27,8 @@ def effects(effects_from: Sequence[str | Path] = ()) -> "pd.DataFrame":
     """
     for path in effects_from:
         load_file(path)
-    return _table({name: _meaning(type(make_effects([name])[0])) for name in effect_names()})
+    meanings = {name: _meaning(type(make_effects([name])[0])) for name in effect_names()}
+    return pd.DataFrame({"meaning": meanings})
 
 
 def scenarios() -> "pd.DataFrame":
@@ -38,10 +39,7 @@ def scenarios() -> "pd.DataFrame":
       >>> "ramp" in gx.scenarios().index
       True
     """
-    return _table({name: one.meaning for name, one in sorted(SCENARIOS.items())})
-
-
-def _table(meanings: Mapping[str, str]) -> "pd.DataFrame":
+    meanings = {name: one.meaning for name, one in sorted(SCENARIOS.items())}
     return pd.DataFrame({"meaning": meanings})
 
 

@@ -17,8 +17,8 @@ from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
 from galileo_jax.observation.digest import digest
-from galileo_jax.report.comparison_page import write_comparison_page
 from galileo_jax.report.diagnosis_charts import comparison_chart
+from galileo_jax.report.diagnosis_page import write_comparison_page
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS

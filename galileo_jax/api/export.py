@@ -26,8 +26,6 @@ from galileo_jax.runtime.precision import in_float64
 
 NETCDF, SVG = "netcdf", "svg"
 FORMATS = (*TABLE_FORMATS, NETCDF, SVG)
-MEASURED = ["x_m", "y_m", "sd_x_m", "sd_y_m", "correlation"]
-ACROSS = ["z_m", "sd_z_m"]  # of motion off the plane
 
 
 @dataclass(frozen=True)
@@ -160,12 +158,13 @@ def _track_table(
             covariance = observed.covariance_m2[k]
             sd = np.sqrt(np.diagonal(covariance)).T
             part = pd.DataFrame({"clip": clip, "object": name, "time_s": observed.times_s})
+            known = len(part.columns)
             part["x_m"], part["y_m"], *z = observed.position_m[k]
             part["sd_x_m"], part["sd_y_m"] = sd[:2]
             part["correlation"] = covariance[0, 1] / (sd[0] * sd[1])
             if z:
                 part["z_m"], part["sd_z_m"] = z[0], sd[2]
-            part.loc[~observed.mask[k], [*MEASURED, *(ACROSS if z else ())]] = np.nan
+            part.loc[~observed.mask[k], part.columns[known:]] = np.nan
             if clip in fitted_m:
                 for axis, values in zip("xyz", fitted_m[clip][k], strict=False):
                     part[f"fitted_{axis}_m"] = values

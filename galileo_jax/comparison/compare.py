@@ -202,11 +202,9 @@ def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarra
     """Where and when it is tested, but for cells most of whose errors the modes take up."""
     found = list[Cell]()
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
-        seen = problem.observation
         absorbed = problem.data.absorbed(scales[clip])
-        every = find_cells(
-            clip, seen.names, is_measured(problem.data.inverse_root), label, seen.axes
-        )
+        measured = is_measured(problem.data.inverse_root)
+        every = find_cells(clip, problem.observation, measured, label)
         found += [cell for cell in every if absorbed[cell.index].mean() < ABSORBED]
     return found
 

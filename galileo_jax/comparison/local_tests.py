@@ -6,15 +6,14 @@ independent standard normal numbers. Each kind of misfit has a statistic: too la
 Whole tracks are tested too, because a deviation may extend over several phases.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dct
 
 from galileo_jax.comparison.phases import PHASES
+from galileo_jax.observation.observation import Observation
 
-AXES = ("x", "y")  # of a picture; others have a third
 MIN_FRAMES = 5
 SLOW_SHARE, MAX_SLOW = 0.25, 6  # cosines that count as slow
 WHOLE = "whole"
@@ -40,11 +39,7 @@ class Cell:
 
 
 def find_cells(
-    clip: int,
-    names: Sequence[str],
-    measured: np.ndarray,
-    labels: np.ndarray,
-    axes: Sequence[str] = AXES,
+    clip: int, seen: Observation, measured: np.ndarray, labels: np.ndarray
 ) -> list[Cell]:
     """The cells of one clip with enough frames.
 
@@ -53,9 +48,9 @@ def find_cells(
     """
     frames = measured.shape[-1]
     found = []
-    for i, name in enumerate(names):
-        for a, axis in enumerate(axes):
-            first = (i * len(axes) + a) * frames
+    for i, name in enumerate(seen.names):
+        for a, axis in enumerate(seen.axes):
+            first = (i * len(seen.axes) + a) * frames
             for phase in (*PHASES, WHOLE):
                 chosen = measured[i, a] & (
                     np.ones(frames, bool) if phase == WHOLE else labels[i] == PHASES.index(phase)

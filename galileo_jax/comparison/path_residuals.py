@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, Place, pulled
-from galileo_jax.comparison.local_tests import AXES, WHOLE
+from galileo_jax.comparison.local_tests import WHOLE
 from galileo_jax.comparison.phases import PHASES, Phase, phases_of
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit
@@ -98,7 +98,10 @@ def _object(
     white = np.where(is_tracked, comparison.white[clip][index], np.nan)
     normal = np.stack([-tangent[1], tangent[0], *tangent[2:]])
     labels = comparison.labels[clip][index]
-    worst = _worst(comparison, problem.name, observation.names[index])
+    worst, failing = _worst(comparison, problem.name, observation.names[index]), None
+    if worst is not None:
+        own = white[observation.axes.index(worst.axis)]
+        failing = failing_interval(own, labels, times, worst.phase)
     return PathResiduals(
         clip=problem.name,
         name=observation.names[index],
@@ -112,22 +115,21 @@ def _object(
         along=np.sum(tangent * white, axis=0),
         across=np.sum(normal * white, axis=0),
         phases=phases_of(labels, times),
-        failing_s=None if worst is None else failing_interval(white, labels, times, worst),
+        failing_s=failing,
         worst=worst,
     )
 
 
 def failing_interval(
-    white: np.ndarray, labels: np.ndarray, times_s: np.ndarray, worst: Place
+    white: np.ndarray, labels: np.ndarray, times_s: np.ndarray, phase: str
 ) -> tuple[float, float] | None:
     """When the residuals of a cell deviate most, to one side: the window of largest |sum| / sqrt n.
 
-    `white` is `[2, frame]`, NaN where nothing was tracked; `labels` are indices into `PHASES`.
+    `white` is `[frame]`, NaN where nothing was tracked; `labels` are indices into `PHASES`.
     """
-    values = white[AXES.index(worst.axis) if worst.axis in AXES else 2]
-    if worst.phase != WHOLE:
-        values = np.where(labels == PHASES.index(worst.phase), values, np.nan)
-    found = worst_interval(values, times_s)
+    if phase != WHOLE:
+        white = np.where(labels == PHASES.index(phase), white, np.nan)
+    found = worst_interval(white, times_s)
     return None if found is None else (found.start_s, found.end_s)
 
 

@@ -12,7 +12,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter
-from galileo_jax.experiment.hypothesis_probabilities import Belief, Beliefs, beliefs_of
+from galileo_jax.experiment.hypothesis_probabilities import Beliefs, beliefs_of
 from galileo_jax.experiment.predicted_experiment import PredictedExperiment, predict_experiment
 from galileo_jax.experiment.proposal import height_m, propose
 from galileo_jax.experiment.settings import grid, parse_can, text_of
@@ -120,9 +120,9 @@ def _about(
     trials: JointProblem, beliefs: Beliefs, predicted: Sequence[PredictedExperiment], about: str
 ) -> float:
     """The gain about a parameter, over the hypotheses that have it."""
-    has = np.array([_has(trials, belief, about) for belief in beliefs.of])
-    share = beliefs.probability * has
     weights = _weights(trials, about)
+    has = np.array([belief.free[weights != 0].all() for belief in beliefs.of])
+    share = beliefs.probability * has
     gains = [
         about_parameter(one, weights) if is_there else 0.0
         for one, is_there in zip(predicted, has, strict=True)
@@ -140,11 +140,6 @@ def _weights(trials: JointProblem, about: str) -> np.ndarray:
     else:
         weights[trials.names.index(about)] = 1.0
     return weights
-
-
-def _has(trials: JointProblem, belief: Belief, about: str) -> bool:
-    names = ("m1", "m2") if about == RATIO else (about,)
-    return all(belief.free[trials.names.index(name)] for name in names)
 
 
 def _check_about(trials: JointProblem, beliefs: Beliefs, about: str) -> None:

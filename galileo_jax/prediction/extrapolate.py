@@ -127,14 +127,12 @@ def as_measured(model: Model, motions: Motions) -> np.ndarray:
 
 def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.ndarray:
     """When an object first touches the next, `[draw]`, s; NaN where it never does."""
-    when = np.full(len(motions.theta), np.nan)
     reach = surroundings.half_length_m[index] + surroundings.half_length_m[index + 1] + TOUCH_M
     gap = motions.position_m[:, index + 1, 0] - motions.position_m[:, index, 0]
     touches = gap <= reach
     is_hit = touches.any(axis=1)
     before = np.maximum(touches.argmax(axis=1) - 1, 0)
-    when[is_hit] = crossing_s(motions.times_s, gap, before, reach)[is_hit]
-    return when
+    return np.where(is_hit, crossing_s(motions.times_s, gap, before, reach), np.nan)
 
 
 def answers(fit: Fitted, motions: Motions, seconds: float, seed: int) -> dict[str, Any]:
@@ -209,6 +207,4 @@ def crossing_s(
 
 
 def _summary(values: np.ndarray) -> dict[str, float] | None:
-    if values.size < 2:
-        return None
-    return summarise(values)
+    return summarise(values) if values.size > 1 else None

@@ -109,7 +109,7 @@ def _stage(
     video: VideoFrames | None,
 ) -> str:
     """The picture: a canvas for the video's frames, shapes over it."""
-    width, height = MM * (view.right_m - view.left_m), MM * (view.top_m - view.bottom_m)
+    width, height = (MM * side for side in view.size_m)
     left = -MM * view.right_m if view.is_mirrored else MM * view.left_m
     turn = ' transform="scale(-1 1)"' if view.is_mirrored else ""
     drawn = [_surface(slab, video is not None) for slab in surfaces(problem.model.scene, view)]

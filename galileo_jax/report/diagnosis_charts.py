@@ -136,9 +136,7 @@ def known_objects(missing: Mapping[str, Any]) -> list[str]:
 def missing_force_chart(missing: Mapping[str, Any], names: Sequence[str]) -> Chart:
     """The acceleration that the model lacks, with its 95 % band, against time, speed and place.
 
-    Args:
-      missing: `missing_force` of diagnosis.json.
-      names: of the objects that are drawn.
+    `missing`: `missing_force` of diagnosis.json; `names`: of the objects that are drawn.
     """
     time, objects = _array(missing, "time_s"), missing["objects"]
     value = np.stack([_array(objects[name], "acceleration_m_s2") for name in names])
@@ -172,9 +170,7 @@ def missing_force_chart(missing: Mapping[str, Any], names: Sequence[str]) -> Cha
 def friction_chart(rows: Sequence[Mapping[str, Any]], clip: str) -> Chart:
     """The coefficient of friction along the way with its 95 % band, of the bodies of one clip.
 
-    Args:
-      rows: `friction_along_way` of diagnosis.json.
-      clip: whose.
+    `rows`: `friction_along_way` of diagnosis.json.
     """
     marks: list[Mark] = []
     for index, row in enumerate(one for one in rows if one["clip"] == clip):

@@ -1,4 +1,4 @@
-"""The page of a diagnosis: verdict, rounds, candidates, and where the model fails."""
+"""The pages of a comparison and of a diagnosis: where the model fails, and what it lacks."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -14,19 +14,33 @@ from galileo_jax.diagnosis.reasons import p_text
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report import html_page as html
+from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
-from galileo_jax.report.comparison_page import cells, engine_and_seed, failures, motion
 from galileo_jax.report.diagnosis_charts import (
     NUM_CANDIDATES,
     before_after_chart,
+    failure_chart,
     friction_chart,
     known_objects,
     missing_force_chart,
     rounds_chart,
 )
+from galileo_jax.report.fit_text import error_text, pull_text
 from galileo_jax.report.provenance import provenance
 from galileo_jax.results.shown import shown
 
+NUM_CELLS = 12
+FAILURES = (
+    "Position and speed along the path, 0 at the foot: measured (dots) and fitted (line). Below, "
+    "the residuals in units of the stated noise: filled along the path, hollow across it; 95 % of "
+    "noise is inside the grey band. Grey: transitions between phases. Yellow, where the model "
+    "fails: the worst interval."
+)
+CELLS = (
+    "A cell is one object, axis and phase of the motion. z: the largest of its test statistics, in "
+    "standard deviations over data simulated with the fitted model. Autocorrelation: of "
+    "neighbouring residuals, about 0 for noise."
+)
 ONLY_WIDE = ("", "log evidence", "log prior", "chi2 per dof", "p")  # of the candidates
 ADDED = (
     "Residuals in units of the noise before and after, on the same axes: filled along the path, "
@@ -39,6 +53,36 @@ FRICTION = (
 )
 ROUNDS = "The error of the velocity in each round, and what tracking noise alone would give."
 LEFT_OUT = "Error of the velocity without and with the added effect."
+
+
+def write_comparison_page(
+    path: Path,
+    title: str,
+    record: Mapping[str, Any],
+    paths: Sequence[PathResiduals],
+    clips: Sequence[Clip],
+    model: tuple[JointProblem, np.ndarray],
+    *,
+    is_adequate: bool,
+    command: str,
+) -> Path:
+    """Writes the page and returns its path.
+
+    `record`: compare.json. `paths`: the objects' along their paths. `model`: with its parameters,
+    as for `_motion`. `command` makes the page again.
+    """
+    left = f"{error_text(record['error'])}."
+    pulls = html.items(map(pull_text, record["pulls"]))
+    effects = html.prose(f"The model: {diagnosis_text.effects_text(record['effects'])}.", "soft")
+    sections = [
+        _failures(is_adequate, paths),
+        _motion(clips, {"fitted": model}),
+        _cells(record["where"], several=len(clips) > 1),
+        provenance(command, clips, _engine_and_seed(record)),
+    ]
+    more = f"{html.prose(left)}\n{pulls}\n{effects}"
+    lead = diagnosis_text.adequacy(record)
+    return html.write_page(path, "comparison", title, lead, sections, more, is_adequate)
 
 
 def write_diagnosis_page(
@@ -55,16 +99,8 @@ def write_diagnosis_page(
 ) -> Path:
     """Writes the page and returns its path; each figure in it can be saved as SVG.
 
-    Args:
-      path: where to.
-      title: of which clips.
-      record: diagnosis.json.
-      paths: of every round, all objects along their paths.
-      clips: that were diagnosed.
-      models: of every round, with its parameters.
-      truth: the effect hidden in a synthetic clip; None where that is not known.
-      command: that makes the page again.
-      next_command: to be run next.
+    `record`: diagnosis.json. `paths`, `models`: of every round, as for a comparison. `truth`: the
+    effect hidden in a synthetic clip; None where that is not known. `command` makes the page again.
     """
     verdict, names = record["verdict"], _titles(record)
     alone = diagnosis_text.each_clip(record.get("each_clip"))
@@ -72,18 +108,18 @@ def write_diagnosis_page(
         html.section("Why", html.items(why["sentence"] for why in record["reasons"])),
         _rounds(record["history"]),
         _candidates(record),
-        motion(clips, dict(zip(names, models, strict=True))),
-        failures(record["adequate"], paths[0], f": {names[0]}"),
+        _motion(clips, dict(zip(names, models, strict=True))),
+        _failures(record["adequate"], paths[0], f": {names[0]}"),
         *(
             html.chart_section(f"Added: {name}", ADDED, charts)
             for name, charts in before_after_charts(record, paths).items()
         ),
         _missing(record),
         _friction(record.get("friction_along_way", [])),
-        cells(record["where"], several=len(clips) > 1),
+        _cells(record["where"], several=len(clips) > 1),
         html.section("Each clip alone", html.items(alone)),
         _left_one_out(record.get("left_one_out", [])),
-        provenance(command, clips, engine_and_seed(record)),
+        provenance(command, clips, _engine_and_seed(record)),
     ]
     hidden = "" if truth is None else html.prose(f"Truth: {truth}.")
     go_on = f'<p class="soft">Next: {html.code(next_command)}</p>'
@@ -190,3 +226,41 @@ def _left_one_out(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [[row["clip"], f"{row['rmse_before']:.4f}", f"{row['rmse_after']:.4f}"] for row in rows]
     cells_of = html.table(["clip", "without, m/s", "with, m/s"], lines)
     return html.section("Each clip predicted from the others", html.prose(LEFT_OUT), cells_of)
+
+
+def _engine_and_seed(record: Mapping[str, Any]) -> dict[str, str]:
+    """What a page's provenance says of how it was computed."""
+    return {key: str(record[key]) for key in ("engine", "seed")}
+
+
+def _motion(clips: Sequence[Clip], models: Mapping[str, tuple[JointProblem, np.ndarray]]) -> str:
+    """Every clip with the motion of each model with its parameters `[parameter]`, by its name."""
+    found = []
+    for i, clip in enumerate(clips):
+        predicted = {
+            name: trials.problems[i].simulate(trials.of_clip(theta, i))
+            for name, (trials, theta) in models.items()
+        }
+        problem = next(iter(models.values()))[0].problems[i]
+        if len(clips) > 1:
+            found.append(f"<h3>{escape(problem.name)}</h3>")
+        found.append(animation(clip, problem, predicted))
+    return html.section("Motion", *found)
+
+
+def _failures(is_adequate: bool, paths: Sequence[PathResiduals], model: str = "") -> str:
+    """The charts of all objects; `model`: with its colon before it, for the heading."""
+    heading = "Residuals" if is_adequate else "Where the model fails"
+    return html.chart_section(f"{heading}{model}", FAILURES, map(failure_chart, paths))
+
+
+def _cells(where: Sequence[Mapping[str, Any]], several: bool) -> str:
+    """The worst cells as a table; `several`: with the clip of each."""
+    words = ["clip"] * several + ["object", "axis", "phase"]
+    numbers = {"rmse": ".4f", "noise": ".4f", "z": ".1f", "whiteness": ".2f"}
+    rows = [
+        [*(place[key] for key in words), *(f"{place[key]:{how}}" for key, how in numbers.items())]
+        for place in where[:NUM_CELLS]
+    ]
+    head = [*words, "rmse, m/s", "noise, m/s", "z", "autocorrelation"]
+    return html.section("Worst cells", html.prose(CELLS), html.table(head, rows))

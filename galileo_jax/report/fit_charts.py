@@ -9,7 +9,6 @@ import numpy as np
 from galileo_jax.comparison.path_residuals import Interval, worst_interval
 from galileo_jax.comparison.phases import Phase
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.chart import (
     Band,
@@ -47,11 +46,6 @@ def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval
     return worst if worst is not None and worst[2].z > FAILS_Z else None
 
 
-def axes_of(fitted: PosteriorPredictive) -> range:
-    """The axes that were measured, as indices into `Observation.axes`."""
-    return range(fitted.observation.position_m.shape[1])
-
-
 def profile_chart(
     fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int, clip: str
 ) -> Chart:
@@ -74,15 +68,11 @@ def fit_chart(fitted: PosteriorPredictive) -> Chart:
 
     Velocities in m/s with 95 % bands, residuals in units of the tracking noise.
     """
-    columns = []
+    columns, axes = [], range(len(fitted.observation.axes))
     for i in range(len(fitted.observation.names)):
-        velocities = (profile_panel(fitted, "velocity", i, axis) for axis in axes_of(fitted))
+        velocities = (profile_panel(fitted, "velocity", i, axis) for axis in axes)
         columns.append(stacked("", "", (*velocities, fit_residual_panel(fitted, i))))
     return side_by_side("fit", "velocities, measured and fitted, and residuals", columns)
-
-
-def _unit(observation: Observation, axis: int) -> str:
-    return "rad" if observation.axes[axis] == "turning" else "m"
 
 
 def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
@@ -144,6 +134,7 @@ def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, a
     measurements are expected, tracking noise included.
     """
     observation = fitted.observation
+    name, along = observation.names[index], observation.axes[axis]
     times_s, drawn = observation.times_s, fitted.position_m[:, index, axis]
     measured = observation.position_m[index, axis]
     variance = observation.covariance_m2[index, axis, axis]
@@ -158,16 +149,16 @@ def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, a
     spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
     mean = drawn.mean(axis=0)
     return Panel(
-        ylabel=f"{quantity}, {_unit(fitted.observation, axis)}{PER[quantity]}",
+        ylabel=f"{quantity}, {'rad' if along == 'turning' else 'm'}{PER[quantity]}",
         marks=(
             Band(times_s, mean - spread, mean + spread, colour, "95 % of measurements", 0.16),
             Band(times_s, low, high, colour, "95 % of the model", 0.4),
             Line(times_s, median, colour, "fitted"),
             Points(times_s, measured, "ink", "measured"),
         ),
-        title=f"{fitted.observation.names[index]}, {fitted.observation.axes[axis]}",
+        title=f"{name}, {along}",
         xlabel="time, s",
-        xlim=time_limits(fitted.observation.times_s),
+        xlim=time_limits(observation.times_s),
         ylim=with_room(*_limits(measured, noise)) if np.isfinite(measured).any() else None,
         phases=fitted.phases[index],
     )

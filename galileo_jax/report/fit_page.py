@@ -14,7 +14,6 @@ from galileo_jax.report import html_page as html
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.fit_charts import (
-    axes_of,
     failing_interval_of,
     pair_chart,
     profile_chart,
@@ -54,13 +53,9 @@ NONE_TO_DETERMINE = "The model of this motion has none to determine."
 def write_report(
     run: Run, page: Path | None = None, lead: str = "", beside: Mapping[str, str] | None = None
 ) -> Path:
-    """Writes a finished fit's page; returns its path.
+    """Writes a finished fit's page, report.html in its folder if no other; returns its path.
 
-    Args:
-      run: the fit.
-      page: where to; default: report.html in the run's folder.
-      lead: the result in words, for the top of the page.
-      beside: titles of other pages to their places, for links.
+    `lead`: the result in words, for the top; `beside`: titles of other pages to their places.
     """
     fitted = posterior_predictive(run, seed=int(run.result["seed"]))
     charts, parameters = fit_charts(run, fitted), shown_parameters(run.result)
@@ -110,7 +105,7 @@ def fit_charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
     draws = [pair_chart(run.posterior, names)]
     if run.result["method"] == "mh":
         draws.append(trace_chart(run.posterior, names))
-    both = [(i, axis) for i in objects for axis in axes_of(fitted)]
+    both = [(i, axis) for i in objects for axis in range(len(fitted.observation.axes))]
     return {
         "velocity": [profile_chart(fitted, "velocity", *one, clip) for one in both],
         "residuals": [residual_chart(fitted, i, clip) for i in objects],

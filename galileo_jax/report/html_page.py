@@ -42,14 +42,8 @@ def write_page(
     Every `<h2>` is an entry of its contents. Plotly is inlined, compressed (2 MB), where there is
     a chart.
 
-    Args:
-      path: where to.
-      kind: what it is, such as "comparison".
-      title: of which clips.
-      lead: the result in one sentence.
-      sections: HTML; empty ones are left out.
-      more: HTML below the sentence.
-      is_good: whether the sentence is good news.
+    `kind`: what it is, such as "comparison"; `title`: of which clips; `lead`: the result in one
+    sentence, good news or not; `more`: HTML below it; `sections`: HTML, empty ones are left out.
     """
     contents, body = _with_anchors("\n".join(filter(None, sections)))
     page = (
@@ -123,9 +117,7 @@ def chart_section(
 def legend(entries: Iterable[tuple[str, str, str]]) -> str:
     """What the marks mean.
 
-    Args:
-      entries: (kind of key, colour of the style sheet, meaning); kinds: line, dashed, dot, fill,
-        cross.
+    `entries`: (line, dashed, dot, fill or cross; colour of the style sheet; meaning).
     """
     listed = "".join(
         f'<li><span class="key {kind}" style="color:var(--{colour})"></span>{escape(text)}</li>'

@@ -23,7 +23,6 @@ from galileo_jax.runtime.atomic_write import replacing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LARGEST_PX = 960
 MARGIN_M = 0.08
 SLAB_M = 0.012  # how thick ramp and table are drawn
 RAIL_M = 0.001  # half a wall's width, seen from above
@@ -37,7 +36,6 @@ class View:
 
     Attributes:
       left_m, right_m, bottom_m, top_m: the picture's edges in the scene.
-      width_px, height_px: its size.
       is_mirrored: the travel is to the left in the picture.
     """
 
@@ -45,9 +43,12 @@ class View:
     right_m: float
     bottom_m: float
     top_m: float
-    width_px: int
-    height_px: int
     is_mirrored: bool
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height."""
+        return self.right_m - self.left_m, self.top_m - self.bottom_m
 
 
 def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
@@ -62,16 +63,12 @@ def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
         if is_mirrored:
             left, right = -right, -left
         bottom, top = (y - height) / scale, y / scale
-        enlarge = min(1.0, LARGEST_PX / max(width, height))
     else:
         places = np.moveaxis(positions_m, -2, -1).reshape(-1, 2)
         reach = MARGIN_M + max(scene.surroundings.half_length_m)
         left, bottom = np.nanmin(places, axis=0) - reach
         right, top = np.nanmax(places, axis=0) + reach
-        width, height = right - left, top - bottom
-        enlarge = LARGEST_PX / max(width, height)
-    size = (2 * round(width * enlarge / 2), 2 * round(height * enlarge / 2))
-    return View(float(left), float(right), float(bottom), float(top), *size, is_mirrored)
+    return View(float(left), float(right), float(bottom), float(top), is_mirrored)
 
 
 def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
@@ -155,8 +152,8 @@ def write_first_and_last(run: Run, motions: Motions, path: Path) -> None:
         f"predicted, {motions.times_s[-1]:.2f} s": -1,
     }
     frames = first_and_last_frame(clip.video) if clip.video else []
-    shapes = [(view.height_px, view.width_px), *(frame.shape for frame in frames)]
-    row_in = COLUMN_IN * max(height / width for height, width, *_ in shapes) + TITLE_IN
+    sizes = [view.size_m, *(frame.shape[1::-1] for frame in frames)]
+    row_in = COLUMN_IN * max(height / width for width, height in sizes) + TITLE_IN
     columns = 2 if frames else 1
     with matplotlib_style("first_and_last"), replacing(path) as temporary:
         figure = Figure(figsize=(COLUMN_IN * columns, row_in * len(stills)), dpi=130)

@@ -21,7 +21,7 @@ of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (
 leave-one-out cross-validation for large data, ICML.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import jax
@@ -36,6 +36,7 @@ from galileo_jax.inference.resampled import resampled
 from galileo_jax.model.parameters import inverse
 from galileo_jax.runtime.lazy import xr
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
+from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 if TYPE_CHECKING:
     from arviz import InferenceData
@@ -48,7 +49,6 @@ OPEN_M = 0.5
 """Coordinates with more noise are ignored by the likelihood (across a fall): they are left out."""
 
 FAR_M = 1e3  # the position of a rollout that failed: no likelihood to speak of, but finite
-AXES = ("x", "y")
 
 
 def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) -> "InferenceData":
@@ -84,11 +84,8 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     measurement = _measurement(trials)
     along = ("chain", "draw", "measurement")
     indices, theta = _thinned(posterior, NUM_PREDICTIVE_DRAWS)
-    predicted = _of_clips(
-        trials,
-        theta.reshape(-1, theta.shape[-1]),
-        lambda data, position, scale: position + noise_draws(rng, scale, data),
-    )
+    rolled_out = _rolled_out(trials, theta.reshape(-1, theta.shape[-1]))
+    predicted = [position + noise_draws(rng, scale, data) for data, position, scale in rolled_out]
     nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
     if _is_weighed(posterior):
         nats["importance_ess"] = f"{posterior.provenance[ESS]:.3g}"
@@ -98,16 +95,15 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
         nats["importance_pareto_k"] = f"{pareto_k:.3g}"
     else:
         like_indices, like_theta = _thinned(posterior, NUM_LIKELIHOOD_DRAWS)
-    density = _of_clips(
-        trials,
-        like_theta.reshape(-1, theta.shape[-1]),
-        lambda data, position, scale: conditional_log_density(
-            data.observed_m - position, scale, data
-        ),
-    )
+    rolled_out = _rolled_out(trials, like_theta.reshape(-1, theta.shape[-1]))
+    density = [
+        conditional_log_density(data.observed_m - position, scale, data)
+        for data, position, scale in rolled_out
+    ]
 
-    def group(values: np.ndarray, at: np.ndarray, attrs: dict[str, str]) -> "xr.Dataset":
-        shaped = values.reshape(-1, len(at), values.shape[-1])
+    def group(values: list[np.ndarray], at: np.ndarray, attrs: dict[str, str]) -> "xr.Dataset":
+        chosen = _chosen(trials, values)
+        shaped = chosen.reshape(-1, len(at), chosen.shape[-1])
         coords = {**measurement, "chain": np.arange(len(shaped)), "draw": at}
         return xr.Dataset({"position": (along, shaped, attrs)}, coords)
 
@@ -147,7 +143,7 @@ def _measurement(trials: JointProblem) -> dict[str, tuple]:
         seen = problem.observation
         clip = np.full(len(frame), problem.name)
         time_s = seen.times_s[frame]
-        parts.append((clip, np.array(seen.names)[thing], np.array(AXES)[axis], frame, time_s))
+        parts.append((clip, np.array(seen.names)[thing], np.array(seen.axes)[axis], frame, time_s))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     named = dict(zip(("clip", "object", "axis", "frame", "time_s"), columns, strict=True))
     units = {"time_s": {"units": "s"}}
@@ -189,10 +185,8 @@ def _drawn_again(
     theta = thinned.reshape(-1, thinned.shape[-1])
     z = inverse(trials.parameters, np.asarray(theta))
     weights = -0.5 * np.sum(z**2, axis=1) - posterior.log_density[:, at].reshape(-1)
-    for clip, problem in enumerate(trials.problems):
-        scale = jnp.asarray(_noise_scales(trials, theta, clip))
-        predicted = jnp.asarray(_positions(trials, theta, clip))
-        weights += np.asarray(_log_densities(predicted, scale, problem.data))
+    for data, position, scale in _rolled_out(trials, theta):
+        weights += np.asarray(_log_densities(jnp.asarray(position), jnp.asarray(scale), data))
     smoothed, pareto_k = arviz().psislw(weights)
     which = resampled(np.asarray(smoothed), min(len(theta), NUM_LIKELIHOOD_DRAWS), rng)
     return theta[which], float(pareto_k)
@@ -203,22 +197,11 @@ _log_densities = jax.jit(
 )
 
 
-def _positions(trials: JointProblem, theta: np.ndarray, clip: int) -> np.ndarray:
-    """`[draw, object, 2, frame]`, m, of `theta` `[draw, parameter]`."""
-    predicted = trials.problems[clip].simulate_batch(trials.of_clip(theta, clip))
-    return np.nan_to_num(np.asarray(predicted), nan=FAR_M, posinf=FAR_M, neginf=-FAR_M)
-
-
-def _noise_scales(trials: JointProblem, theta: np.ndarray, clip: int) -> np.ndarray:
-    return theta[:, len(trials.model_parameters) + clip]
-
-
-def _of_clips(
-    trials: JointProblem, theta: np.ndarray, function: Callable[..., np.ndarray]
-) -> np.ndarray:
-    """What a function of a clip's data, positions and noise scales gives, `[draw, measurement]`."""
-    values = [
-        function(problem.data, _positions(trials, theta, clip), _noise_scales(trials, theta, clip))
-        for clip, problem in enumerate(trials.problems)
-    ]
-    return _chosen(trials, values)
+def _rolled_out(
+    trials: JointProblem, theta: np.ndarray
+) -> Iterator[tuple[Whitening, np.ndarray, np.ndarray]]:
+    """Each clip's data, positions `[draw, object, 2, frame]`, m, and noise scales `[draw]`."""
+    for clip, problem in enumerate(trials.problems):
+        position = problem.simulate_batch(trials.of_clip(theta, clip))
+        position = np.nan_to_num(position, nan=FAR_M, posinf=FAR_M, neginf=-FAR_M)
+        yield problem.data, position, theta[:, len(trials.model_parameters) + clip]

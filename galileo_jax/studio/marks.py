@@ -123,9 +123,8 @@ def with_other(marks: Marks, name: str, **given: Any) -> Marks:
 
 def with_rectangle(marks: Marks, size_px: tuple[int, int]) -> Marks:
     """A rectangle to be laid on one of known sides, in place of the stick."""
-    sides = (size_px[0], size_px[0], size_px[1], size_px[1])
-    left, right, top, bottom = (
-        round(share * side, 1) for share, side in zip((0.3, 0.7, 0.3, 0.7), sides, strict=True)
+    (left, right), (top, bottom) = (
+        (round(0.3 * side, 1), round(0.7 * side, 1)) for side in size_px
     )
     corners = ((left, bottom), (right, bottom), (right, top), (left, top))
     return replace(marks, rectangle=corners)

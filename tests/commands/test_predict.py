@@ -134,13 +134,13 @@ def test_the_stills_show_where_the_objects_are(runs, tmp_path):
     scene, clip = run.problem.model.scene, run.clip
     start_m = np.array(scene.surroundings.start_m)
     view = view_of(clip, scene, np.stack([start_m, start_m], axis=-1))
-    figure = Figure(figsize=(view.width_px / 100, view.height_px / 100), dpi=100)
+    width_m, height_m = view.size_m
+    figure = Figure(figsize=(9.6, 9.6 * height_m / width_m), dpi=100)
     canvas = FigureCanvasAgg(figure)
     draw_still(figure.add_axes((0, 0, 1, 1)), clip, scene, view, start_m)
     canvas.draw()
     picture = np.asarray(canvas.buffer_rgba())[..., :3]
-    assert picture.shape == (view.height_px, view.width_px, 3)
-    scale = view.width_px / (view.right_m - view.left_m)
+    scale = picture.shape[1] / width_m
     for i, (x, y) in enumerate(start_m):
         column, row = int(scale * (x - view.left_m)), int(scale * (view.top_m - y))
         assert bytes(picture[row, column]).hex() == palette()[object_colour(i)][1:]

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.comparison.compare import Place, comparison_document
+from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis.diagnosis import Law, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
-from galileo_jax.report.comparison_page import write_comparison_page
 from galileo_jax.report.diagnosis_page import (
     before_after_charts,
+    write_comparison_page,
     write_diagnosis_page,
 )
 from galileo_jax.report.draw import write_svgs
@@ -162,17 +162,12 @@ def test_the_worst_stretch_is_where_the_residuals_were_bent(trials):
 
 
 def test_a_stretch_keeps_to_its_phase():
-    white = np.zeros((2, 30))
-    white[0, 5:9], white[0, 20:29] = 3.0, 9.0
+    white = np.zeros(30)
+    white[5:9], white[20:29] = 3.0, 9.0
     labels = np.where(np.arange(30) < 15, PHASES.index("ramp"), PHASES.index("table"))
-    place = place_in("ramp")
-    assert failing_interval(white, labels, np.arange(30.0), place) == (5.0, 8.0)
-    assert failing_interval(white, labels, np.arange(30.0), place_in("whole")) == (20.0, 28.0)
-    assert failing_interval(white, labels, np.arange(30.0), place_in("held")) is None
-
-
-def place_in(phase: str) -> Place:
-    return Place("clip", "object1", "x", phase, 0.0, 0.0, 9.0, 0.0)
+    assert failing_interval(white, labels, np.arange(30.0), "ramp") == (5.0, 8.0)
+    assert failing_interval(white, labels, np.arange(30.0), "whole") == (20.0, 28.0)
+    assert failing_interval(white, labels, np.arange(30.0), "held") is None
 
 
 def test_a_fit_at_the_truth_lies_on_the_measured_path(trials):
