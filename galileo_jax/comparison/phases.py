@@ -10,6 +10,7 @@ import numpy as np
 
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import Model
 from galileo_jax.numerics.line_segments import distance_to_segment
 
 ON_A_SURFACE = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
@@ -53,10 +54,7 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     """
     model = problem.model
     scene = model.scene.surroundings
-    named = model.by_name(theta)
-    times = np.asarray(problem.observation.times_s)
-    for effect in model.effects + model.nuisances:
-        times = np.asarray(effect.time(times, named, scene))
+    times = since_release(model, theta, problem.observation.times_s)
     position, velocity = (a[0] for a in problem.engine.simulate(theta[None]))
     recorded = np.arange(position.shape[-1]) * model.record_dt_s
     label = np.empty((len(scene.names), len(times)), int)
@@ -79,6 +77,14 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
         label[i][np.abs(times - hit_s[i]) <= COLLISION_S] = PHASES.index("collision")
         label[i][times < 0 if scene.starts_moving else times <= 0] = PHASES.index("held")
     return label
+
+
+def since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """The clip's times as the time since the release, s."""
+    named = model.by_name(theta)
+    for effect in model.effects + model.nuisances:
+        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
+    return times_s
 
 
 def free_phase(scene: Surroundings) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.comparison.phases import since_release
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.summarise import summarise
@@ -95,7 +96,7 @@ def roll_out(model: Model, engine: Engine, theta: np.ndarray, times_s: np.ndarra
     shape = (*position.shape[:-1], len(times_s))
     at_position, at_velocity = np.empty(shape), np.empty(shape)
     for i, row in enumerate(theta):
-        times = _since_release(model, row, times_s)
+        times = since_release(model, row, times_s)
         for place in np.ndindex(shape[1:3]):
             at_position[i][place] = np.interp(times, recorded, position[i][place])
             at_velocity[i][place] = np.interp(times, recorded, velocity[i][place])
@@ -108,7 +109,7 @@ def extrapolate(fit: Fitted, seconds: float, num_draws: int, seed: int) -> Motio
     model = fit.problem.model
     theta = draw_theta(fit, num_draws, seed)
     until_s = float(fit.problem.observation.times_s[-1]) + seconds
-    longest = max(float(_since_release(model, row, np.asarray(until_s))) for row in theta)
+    longest = max(float(since_release(model, row, np.asarray(until_s))) for row in theta)
     longer = replace(model, duration_s=max(longest, GRID_S))
     engine = make_engine(fit.problem.engine.name, longer)
     times_s = np.linspace(0.0, until_s, int(np.ceil(until_s / GRID_S)) + 1)
@@ -183,14 +184,6 @@ def answers(fit: Fitted, motions: Motions, seconds: float, seed: int) -> dict[st
         "engine": fit.problem.engine.name,
         "version": __version__,
     }
-
-
-def _since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-    """The clip's times as the time since the release, s."""
-    named = model.by_name(theta)
-    for effect in model.effects + model.nuisances:
-        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
-    return times_s
 
 
 def crossing_s(

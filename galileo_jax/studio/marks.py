@@ -10,6 +10,7 @@ Correction = tuple[int, float, float]  # frame, x, y
 Corners = tuple[Point, Point, Point, Point]
 
 CORNERS = ("corner1", "corner2", "corner3", "corner4")  # from the bottom left, counter-clockwise
+ENDS = {"rectangle": CORNERS, "stick": ("stick1", "stick2")}  # what of a mark can be grabbed
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,8 @@ def handles(marks: Marks) -> dict[str, Point]:
     found = {one.name: one.point for one in marks.objects if one.point is not None}
     if marks.has_ramp:
         found |= {k: p for k in ("upper", "foot") if (p := getattr(marks, k)) is not None}
-    if marks.rectangle is not None:
-        found |= dict(zip(CORNERS, marks.rectangle, strict=True))
-    elif marks.stick is not None:
-        found |= {"stick1": marks.stick[0], "stick2": marks.stick[1]}
-    return found
+    scale = "stick" if marks.rectangle is None else "rectangle"
+    return found | dict(zip(ENDS[scale], getattr(marks, scale) or (), strict=False))
 
 
 def moved(marks: Marks, handle: str, to: Point) -> Marks:
@@ -105,13 +103,10 @@ def moved(marks: Marks, handle: str, to: Point) -> Marks:
         return replace(marks, foot=to, upper=upper)
     if handle in ("upper", "foot"):
         return replace(marks, **{handle: to})
-    if handle in ("stick1", "stick2") and marks.stick is not None:
-        one, other = marks.stick
-        return replace(marks, stick=(to, other) if handle == "stick1" else (one, to))
-    if handle in CORNERS and marks.rectangle is not None:
-        corners = list(marks.rectangle)
-        corners[CORNERS.index(handle)] = to
-        return replace(marks, rectangle=tuple(corners))  # pyright: ignore
+    for mark, ends in ENDS.items():
+        if handle in ends and (places := getattr(marks, mark)) is not None:
+            at = ends.index(handle)
+            return replace(marks, **{mark: (*places[:at], to, *places[at + 1 :])})
     return with_other(marks, handle, point=to)
 
 
