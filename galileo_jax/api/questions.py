@@ -27,25 +27,16 @@ NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
 
 @dataclass(frozen=True)
 class Question:
-    """Something that is asked of a person.
+    """Something that is asked of a person."""
 
-    Attributes:
-      key: of the yaml; "points" for which things are meant.
-      text: what is asked.
-      why: why it is asked, or what speaks for the default.
-      option: of `galileo FILE` that answers it, as an example.
-      default: what no answer means, as text; None where a guess would give a wrong result.
-      choices: what may be answered; empty: anything.
-      is_open: nobody but a person can say; else the default will do.
-    """
-
-    key: str
-    text: str
-    why: str
-    option: str
+    key: str  # of the yaml; "points" for which things are meant
+    text: str  # what is asked
+    why: str  # why it is asked, or what speaks for the default
+    option: str  # of `galileo FILE` that answers it, as an example
+    # What no answer means, as text; None where a guess would give a wrong result.
     default: str | None = None
-    choices: tuple[str, ...] = ()
-    is_open: bool = True
+    choices: tuple[str, ...] = ()  # what may be answered; empty: anything
+    is_open: bool = True  # nobody but a person can say; else the default will do
 
 
 def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
@@ -64,17 +55,11 @@ def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
 
 @dataclass(frozen=True)
 class Answered:
-    """All questions, with what was typed to them.
+    """All questions, with what was typed to them."""
 
-    Attributes:
-      questions: in the order in which they are asked.
-      answers: by keys of the yaml; the defaults where nothing was typed.
-      problems: by the question's key, one line that says what would be right.
-    """
-
-    questions: tuple[Question, ...]
-    answers: Answers
-    problems: Mapping[str, str]
+    questions: tuple[Question, ...]  # in the order in which they are asked
+    answers: Answers  # by keys of the yaml; the defaults where nothing was typed
+    problems: Mapping[str, str]  # by the question's key, one line that says what would be right
 
 
 def answered(known: Understood, typed: Mapping[str, str]) -> Answered:

@@ -74,29 +74,19 @@ class FilmPath:
 
 @dataclass(frozen=True, eq=False)
 class Understood:
-    """What a film or table shows, and what is declared beside it.
+    """What a film or table shows, and what is declared beside it."""
 
-    Attributes:
-      source: the film or table.
-      yaml_path: of the yaml beside it, which need not be there.
-      declared: what it says; empty where there is none.
-      look: what `look` makes of the source.
-      things: what moves in a film whose yaml names no objects, to its size in the picture, px.
-      first_frames: in which of these are first seen that come later.
-      foot: of a ramp that such a film shows, px; None: it shows none.
-      unseen: why no moving thing was found in such a film; "" where one was.
-      is_on_ramp: its first look shows two things on a ramp, one after the other.
-    """
-
-    source: Path
-    yaml_path: Path
-    declared: Mapping[str, Any]
-    look: Look
+    source: Path  # the film or table
+    yaml_path: Path  # of the yaml beside it, which need not be there
+    declared: Mapping[str, Any]  # what it says; empty where there is none
+    look: Look  # what `look` makes of the source
+    # What moves in a film whose yaml names no objects, to its size in the picture, px.
     things: Mapping[Point, Point] = field(default_factory=dict)
+    # In which of these are first seen that come later.
     first_frames: Mapping[Point, int] = field(default_factory=dict)
-    foot: Point | None = None
-    is_on_ramp: bool = False
-    unseen: str = ""
+    foot: Point | None = None  # of a ramp that such a film shows, px; None: it shows none
+    is_on_ramp: bool = False  # its first look shows two things on a ramp, one after the other
+    unseen: str = ""  # why no moving thing was found in such a film; "" where one was
     _paths: dict[Point, FilmPath] = field(default_factory=dict, repr=False)
 
     @cached_property

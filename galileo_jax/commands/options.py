@@ -26,19 +26,12 @@ METAVARS = {"int": "N", "float": "X", "str | Path": "PATH"}
 
 
 class Argument(NamedTuple):
-    """An argument of a public function.
+    """An argument of a public function."""
 
-    Attributes:
-      annotation: its type, as text.
-      default: `REQUIRED` where it has none.
-      meaning: from the docstring, without a full stop.
-      is_positional: it need not be given by its name.
-    """
-
-    annotation: str
-    default: Any
-    meaning: str
-    is_positional: bool
+    annotation: str  # its type, as text
+    default: Any  # `REQUIRED` where it has none
+    meaning: str  # from the docstring, without a full stop
+    is_positional: bool  # it need not be given by its name
 
 
 @cache

@@ -49,24 +49,16 @@ PULL_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Place:
-    """One cell in numbers.
-
-    Attributes:
-      clip, object, axis, phase: where.
-      rmse: of the velocity's residuals, m/s.
-      noise: what the stated tracking errors alone give, m/s.
-      z: the largest of its statistics, in standard deviations of the replicates.
-      whiteness: correlation of neighbouring residuals.
-    """
+    """One cell in numbers."""
 
     clip: str
     object: str
     axis: str
     phase: str
-    rmse: float
-    noise: float
-    z: float
-    whiteness: float
+    rmse: float  # of the velocity's residuals, m/s
+    noise: float  # what the stated tracking errors alone give, m/s
+    z: float  # the largest of its statistics, in standard deviations of the replicates
+    whiteness: float  # correlation of neighbouring residuals
 
 
 @dataclass(frozen=True)

@@ -36,23 +36,14 @@ FEWEST = 3  # groups: of two that differ nobody can say which is wrong
 
 @dataclass(frozen=True)
 class Consensus:
-    """A value that a class found.
+    """A value that a class found."""
 
-    Attributes:
-      mean: mu, of the groups that do not lie outside.
-      sd: its standard deviation.
-      scatter: tau, standard deviation between groups beyond what they state.
-      t: `[group]`, how far each is from what the others find.
-      others: `[group]`, what the others find.
-      is_outside: `[group]`.
-    """
-
-    mean: float
-    sd: float
-    scatter: float
-    t: np.ndarray
-    others: np.ndarray
-    is_outside: np.ndarray
+    mean: float  # mu, of the groups that do not lie outside
+    sd: float  # its standard deviation
+    scatter: float  # tau, standard deviation between groups beyond what they state
+    t: np.ndarray  # `[group]`, how far each is from what the others find
+    others: np.ndarray  # `[group]`, what the others find
+    is_outside: np.ndarray  # `[group]`
 
 
 def consensus(values: np.ndarray, sds: np.ndarray) -> Consensus:

@@ -21,21 +21,13 @@ WHOLE = "whole"
 
 @dataclass(frozen=True)
 class Cell:
-    """Where a statistic looks.
+    """Where a statistic looks."""
 
-    Attributes:
-      clip: index of the clip.
-      object: its name.
-      axis: "x" or "y".
-      phase: of `PHASES`, or "whole".
-      index: of its values in a clip's whitened residuals, in the order of time.
-    """
-
-    clip: int
+    clip: int  # index of the clip
     object: str
-    axis: str
-    phase: str
-    index: np.ndarray
+    axis: str  # "x" or "y"
+    phase: str  # of `PHASES`, or "whole"
+    index: np.ndarray  # of its values in a clip's whitened residuals, in the order of time
 
 
 def find_cells(

@@ -28,20 +28,13 @@ MOST_SETTINGS = 9  # that a diagnosis looks at in passing; `galileo next` looks 
 
 @dataclass(frozen=True)
 class Expected:
-    """One setting, and what is expected of an experiment there.
+    """One setting, and what is expected of an experiment there."""
 
-    Attributes:
-      setting: name to value, as the lab calls them.
-      gain_nats: about which hypothesis holds, or about the parameter asked for.
-      named: how probable it is that the true hypothesis is then far ahead of all others.
-      lead_nats: how far it is then ahead on average, log odds.
-      hit: how probable it is that object 1 hits another object; None where there is none.
-    """
-
-    setting: Mapping[str, Any]
-    gain_nats: float
-    named: float
-    lead_nats: float
+    setting: Mapping[str, Any]  # name to value, as the lab calls them
+    gain_nats: float  # about which hypothesis holds, or about the parameter asked for
+    named: float  # how probable it is that the true hypothesis is then far ahead of all others
+    lead_nats: float  # how far it is then ahead on average, log odds
+    # How probable it is that object 1 hits another object; None where there is none.
     hit: float | None
 
 

@@ -28,17 +28,11 @@ NUM_TRACKS = 256  # drawn from each hypothesis
 
 
 class Gain(NamedTuple):
-    """What an experiment is expected to tell.
+    """What an experiment is expected to tell."""
 
-    Attributes:
-      nats: about which hypothesis holds.
-      named: how probable it is that the true one is then ahead of all others by the margin.
-      lead: how far it is then ahead on average, nats of log odds.
-    """
-
-    nats: float
-    named: float
-    lead: float
+    nats: float  # about which hypothesis holds
+    named: float  # how probable it is that the true one is then ahead of all others by the margin
+    lead: float  # how far it is then ahead on average, nats of log odds
 
 
 def about_hypotheses(

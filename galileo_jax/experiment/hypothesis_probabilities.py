@@ -25,21 +25,13 @@ MOST, FARTHEST = 8, 7.0
 
 @dataclass(frozen=True)
 class Belief:
-    """One hypothesis after the data.
+    """One hypothesis after the data."""
 
-    Attributes:
-      effects: that are there; none is the model without any.
-      log_odds: over no effect, nats.
-      z: `[parameter]`, the mode, in the trials' order.
-      free: `[parameter]`, which it has.
-      covariance: `[parameter, parameter]`, in z.
-    """
-
-    effects: tuple[str, ...]
-    log_odds: float
-    z: np.ndarray
-    free: np.ndarray
-    covariance: np.ndarray
+    effects: tuple[str, ...]  # that are there; none is the model without any
+    log_odds: float  # over no effect, nats
+    z: np.ndarray  # `[parameter]`, the mode, in the trials' order
+    free: np.ndarray  # `[parameter]`, which it has
+    covariance: np.ndarray  # `[parameter, parameter]`, in z
 
     @property
     def name(self) -> str:
@@ -49,15 +41,10 @@ class Belief:
 
 @dataclass(frozen=True)
 class Beliefs:
-    """All hypotheses that are still possible.
+    """All hypotheses that are still possible."""
 
-    Attributes:
-      of: the most probable first.
-      margin: difference in log odds, nats, at which a diagnosis rules one out.
-    """
-
-    of: tuple[Belief, ...]
-    margin: float
+    of: tuple[Belief, ...]  # the most probable first
+    margin: float  # difference in log odds, nats, at which a diagnosis rules one out
 
     @property
     def probability(self) -> np.ndarray:

@@ -18,25 +18,18 @@ FILE = "discover.json"
 
 @dataclass
 class Journal:
-    """What has been done so far.
+    """What has been done so far."""
 
-    Attributes:
-      folder: it stands there, with the clips.
-      lab: of the lab: `{"settings": ..., "clip": ...}`, as it describes itself.
-      experiments: `{number, settings, reason, outcome, line, clip}` each; outcome: None while it
-        is being made, "track", or "lost" with the line that says why.
-      rounds: a verdict each: `{clips, status, effects, form, law, sentence, hypotheses}`.
-      held: settings that are left alone, by name.
-      ended: why nothing more is done; None while something is.
-    """
-
-    folder: Path
-    lab: dict[str, Any]
+    folder: Path  # it stands there, with the clips
+    lab: dict[str, Any]  # of the lab: `{"settings": ..., "clip": ...}`, as it describes itself
     seed: int
+    # `{number, settings, reason, outcome, line, clip}` each; outcome: None while it is being made,
+    # "track", or "lost" with the line that says why.
     experiments: list[dict[str, Any]] = field(default_factory=list)
+    # A verdict each: `{clips, status, effects, form, law, sentence, hypotheses}`.
     rounds: list[dict[str, Any]] = field(default_factory=list)
-    held: dict[str, Any] = field(default_factory=dict)
-    ended: str | None = None
+    held: dict[str, Any] = field(default_factory=dict)  # settings that are left alone, by name
+    ended: str | None = None  # why nothing more is done; None while something is
 
     @property
     def tracks(self) -> list[dict[str, Any]]:

@@ -51,15 +51,10 @@ class LabError(Exception):
 
 @dataclass(frozen=True)
 class Described:
-    """What a lab says of itself.
+    """What a lab says of itself."""
 
-    Attributes:
-      can: what can be set, by its own names.
-      clip: the declared part of a clip's yaml.
-    """
-
-    can: Can
-    clip: Mapping[str, Any]
+    can: Can  # what can be set, by its own names
+    clip: Mapping[str, Any]  # the declared part of a clip's yaml
 
     @property
     def document(self) -> dict[str, Any]:
@@ -83,15 +78,10 @@ class Lab(Protocol):
 
 @dataclass(frozen=True)
 class Program:
-    """A lab that is a program of its own.
+    """A lab that is a program of its own."""
 
-    Attributes:
-      words: of its command line.
-      timeout_s: after so long it is stopped.
-    """
-
-    words: tuple[str, ...]
-    timeout_s: float
+    words: tuple[str, ...]  # of its command line
+    timeout_s: float  # after so long it is stopped
 
     def describe(self) -> Described:
         """What `LAB --describe` prints."""

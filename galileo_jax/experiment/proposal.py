@@ -27,17 +27,12 @@ MOST_FRAMES = 128  # of a fast camera's frames the mean of several is taken, wit
 
 @dataclass(frozen=True)
 class Proposal:
-    """An experiment that could be made.
+    """An experiment that could be made."""
 
-    Attributes:
-      problem: its scene and model; the observation has times and errors, and stands still.
-      renamed: name in this problem to name in the trials, of what has changed its place.
-      fixed: name to value, of what the setting says.
-    """
-
-    problem: Problem
+    problem: Problem  # its scene and model; the observation has times and errors, and stands still
+    # Name in this problem to name in the trials, of what has changed its place.
     renamed: Mapping[str, str]
-    fixed: Mapping[str, float]
+    fixed: Mapping[str, float]  # name to value, of what the setting says
 
 
 def propose(

@@ -47,21 +47,13 @@ class Fitted(Protocol):
 
 @dataclass(frozen=True)
 class Motions:
-    """The motions of several parameter vectors.
+    """The motions of several parameter vectors."""
 
-    Attributes:
-      theta: `[draw, parameter]`, the model's parameters in their units.
-      times_s: `[time]`, on the clip's clock.
-      position_m: `[draw, object, 2, time]`, centres.
-      velocity_m_s: `[draw, object, 2, time]`.
-      num_failed: rollouts that the engine gave up; they are not among the draws.
-    """
-
-    theta: np.ndarray
-    times_s: np.ndarray
-    position_m: np.ndarray
-    velocity_m_s: np.ndarray
-    num_failed: int
+    theta: np.ndarray  # `[draw, parameter]`, the model's parameters in their units
+    times_s: np.ndarray  # `[time]`, on the clip's clock
+    position_m: np.ndarray  # `[draw, object, 2, time]`, centres
+    velocity_m_s: np.ndarray  # `[draw, object, 2, time]`
+    num_failed: int  # rollouts that the engine gave up; they are not among the draws
 
     @property
     def speed_m_s(self) -> np.ndarray:

@@ -93,34 +93,22 @@ LETTER_PX, SLANTED_PX, SLANT_DEG = 6.5, 4.5, 35  # of the names of categories
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes.
+    """One pair of axes."""
 
-    Attributes:
-      ylabel: quantity and unit.
-      marks: from the back to the front.
-      title: over the axes.
-      xlabel: quantity and unit; "" where the panel below has the same axis.
-      xlim, ylim: ends of the axes; None = whatever is drawn.
-      is_log_y: the y axis is logarithmic; it has no `ylim` then.
-      has_y_ticks: whether the y axis has numbers.
-      phases: named on top; passages between phases are shaded.
-      highlights: of x, where the model fails; None: nowhere.
-      level: of y, drawn as a line.
-      divider: x at which a line with a name is drawn.
-    """
-
-    ylabel: str
-    marks: tuple[Mark, ...]
-    title: str = ""
-    xlabel: str = ""
+    ylabel: str  # quantity and unit
+    marks: tuple[Mark, ...]  # from the back to the front
+    title: str = ""  # over the axes
+    xlabel: str = ""  # quantity and unit; "" where the panel below has the same axis
+    # Ends of the axes; None = whatever is drawn.
     xlim: tuple[float, float] | None = None
     ylim: tuple[float, float] | None = None
-    is_log_y: bool = False
-    has_y_ticks: bool = True
-    phases: tuple[Phase, ...] = ()
+    is_log_y: bool = False  # the y axis is logarithmic; it has no `ylim` then
+    has_y_ticks: bool = True  # whether the y axis has numbers
+    phases: tuple[Phase, ...] = ()  # named on top; passages between phases are shaded
+    # Of x, where the model fails; None: nowhere.
     highlights: tuple[tuple[float, float] | None, ...] = ()
-    level: float | None = None
-    divider: tuple[float, str] | None = None
+    level: float | None = None  # of y, drawn as a line
+    divider: tuple[float, str] | None = None  # x at which a line with a name is drawn
 
     @property
     def spans(self) -> list[tuple[float, float, str, float]]:
@@ -143,23 +131,16 @@ class Panel:
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels in a grid.
+    """Panels in a grid."""
 
-    Attributes:
-      name: of its file.
-      label: what is seen, for those who do not see it.
-      panels: row by row; None leaves a place empty. The panels of a column share x where only
-        the last has an `xlabel`.
-      clip: whose time is on x; None = x is not the time of a clip.
-      columns: of the grid.
-      panel_px: height of a panel; None = as one or several panels usually have it.
-    """
-
-    name: str
-    label: str
+    name: str  # of its file
+    label: str  # what is seen, for those who do not see it
+    # Row by row; None leaves a place empty. The panels of a column share x where only the last has
+    # an `xlabel`.
     panels: tuple[Panel | None, ...]
-    clip: str | None = None
-    columns: int = 1
+    clip: str | None = None  # whose time is on x; None = x is not the time of a clip
+    columns: int = 1  # of the grid
+    # Height of a panel; None = as one or several panels usually have it.
     panel_px: int | None = None
 
     @property

@@ -25,26 +25,17 @@ CLASS_NOTE = (
 
 @dataclass(frozen=True)
 class Agreement:
-    """A quantity that most groups of a class determined.
-
-    Attributes:
-      quantity: its name.
-      unit: "1" of a pure number.
-      groups: names of those that determined it.
-      values: `[group]`.
-      low, high: `[group]`, ends of the 95 % intervals.
-      found: the consensus.
-      undetermined: how many groups have a result and not this quantity.
-    """
+    """A quantity that most groups of a class determined."""
 
     quantity: str
-    unit: str
-    groups: tuple[str, ...]
-    values: np.ndarray
+    unit: str  # "1" of a pure number
+    groups: tuple[str, ...]  # names of those that determined it
+    values: np.ndarray  # `[group]`
+    # `[group]`, ends of the 95 % intervals.
     low: np.ndarray
     high: np.ndarray
     found: Consensus
-    undetermined: int = 0
+    undetermined: int = 0  # how many groups have a result and not this quantity
 
     @property
     def sentence(self) -> str:

@@ -23,21 +23,14 @@ NAME_GAP_PX = 4.0  # between a box and its number
 
 @dataclass(frozen=True)
 class Marked:
-    """A thing in a picture; pixels, x right, y down.
+    """A thing in a picture; pixels, x right, y down."""
 
-    Attributes:
-      name: that stands beside it: its number, or what it is called.
-      middle_px: of the thing.
-      size_px: (width, height); None where nobody knows.
-      way_px: `[2, place]`, where it is one picture after the other; empty: not known.
-      slope_deg: of a straight way against the horizontal; None of others.
-    """
-
-    name: str
-    middle_px: tuple[float, float]
-    size_px: tuple[float, float] | None = None
+    name: str  # that stands beside it: its number, or what it is called
+    middle_px: tuple[float, float]  # of the thing
+    size_px: tuple[float, float] | None = None  # (width, height); None where nobody knows
+    # `[2, place]`, where it is one picture after the other; empty: not known.
     way_px: np.ndarray | None = None
-    slope_deg: float | None = None
+    slope_deg: float | None = None  # of a straight way against the horizontal; None of others
 
 
 def write_marked_picture(path: Path, frame: np.ndarray, things: Sequence[Marked]) -> Path:

@@ -32,18 +32,14 @@ COLUMN_IN, TITLE_IN = 4.8, 0.3  # of the picture
 
 @dataclass(frozen=True)
 class View:
-    """A side view without perspective.
+    """A side view without perspective."""
 
-    Attributes:
-      left_m, right_m, bottom_m, top_m: the picture's edges in the scene.
-      is_mirrored: the travel is to the left in the picture.
-    """
-
+    # The picture's edges in the scene.
     left_m: float
     right_m: float
     bottom_m: float
     top_m: float
-    is_mirrored: bool
+    is_mirrored: bool  # the travel is to the left in the picture
 
     @property
     def size_m(self) -> tuple[float, float]:

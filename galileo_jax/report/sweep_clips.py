@@ -43,35 +43,21 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ClipRow:
-    """A clip and what a sweep found of it.
+    """A clip and what a sweep found of it."""
 
-    Attributes:
-      name: that the clip is shown by.
-      together_with: names of the trials that it was fitted together with.
-      picture: JPEG; None of a clip without a video.
-      observation: its track; None where it could not be tracked.
-      fit: result.json of its fit; None without one.
-      diagnosis: diagnosis.json; None where it was not diagnosed.
-      pages: label and path of its own pages, relative to the sweep's page.
-      failures: why it has no result, a sentence each.
-      other_fits: how many fits it has beside the one that is shown.
-      check: compare.json of a fit that was explained.
-      remark: why it stands apart from the others; empty where it does not.
-      outside: the quantities that the others find otherwise.
-    """
-
-    name: str
-    together_with: tuple[str, ...] = ()
-    picture: bytes | None = None
-    observation: Observation | None = None
-    fit: Document | None = None
-    diagnosis: Document | None = None
+    name: str  # that the clip is shown by
+    together_with: tuple[str, ...] = ()  # names of the trials that it was fitted together with
+    picture: bytes | None = None  # JPEG; None of a clip without a video
+    observation: Observation | None = None  # its track; None where it could not be tracked
+    fit: Document | None = None  # result.json of its fit; None without one
+    diagnosis: Document | None = None  # diagnosis.json; None where it was not diagnosed
+    # Label and path of its own pages, relative to the sweep's page.
     pages: tuple[tuple[str, Path], ...] = ()
-    failures: tuple[str, ...] = ()
-    other_fits: int = 0
-    check: Document | None = None
-    remark: str = ""
-    outside: tuple[str, ...] = ()
+    failures: tuple[str, ...] = ()  # why it has no result, a sentence each
+    other_fits: int = 0  # how many fits it has beside the one that is shown
+    check: Document | None = None  # compare.json of a fit that was explained
+    remark: str = ""  # why it stands apart from the others; empty where it does not
+    outside: tuple[str, ...] = ()  # the quantities that the others find otherwise
 
 
 def thumbnail(clip: Clip, observation: Observation) -> bytes | None:

@@ -16,17 +16,11 @@ QUALITIES = (80, 65, 50, 35)
 
 @dataclass(frozen=True)
 class VideoFrames:
-    """Evenly spaced frames of a video.
-
-    Attributes:
-      frames: their numbers.
-      pictures: JPEGs, as data URIs.
-      size_px: (width, height) of the pictures.
-    """
+    """Evenly spaced frames of a video."""
 
     frames: tuple[int, ...]
-    pictures: tuple[str, ...]
-    size_px: tuple[int, int]
+    pictures: tuple[str, ...]  # JPEGs, as data URIs
+    size_px: tuple[int, int]  # (width, height) of the pictures
 
 
 def sample_frames(video: Path, num_frames: int) -> VideoFrames:

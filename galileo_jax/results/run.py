@@ -38,21 +38,13 @@ BEST = "z_best"  # in the posterior's provenance: the best fit, in the search sp
 
 @dataclass(frozen=True)
 class Run:
-    """A finished fit.
+    """A finished fit."""
 
-    Attributes:
-      folder: where it is.
-      clip: as fitted.
-      problem: observation, model and engine, as fitted.
-      posterior: draws in the parameters' units, names as `trials.names`.
-      result: result.json.
-    """
-
-    folder: Path
-    clip: Clip
-    problem: Problem
-    posterior: Posterior
-    result: dict[str, Any]
+    folder: Path  # where it is
+    clip: Clip  # as fitted
+    problem: Problem  # observation, model and engine, as fitted
+    posterior: Posterior  # draws in the parameters' units, names as `trials.names`
+    result: dict[str, Any]  # result.json
 
     @property
     def trials(self) -> JointProblem:

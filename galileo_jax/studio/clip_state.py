@@ -27,16 +27,11 @@ MOST_STEPS = 60  # that can be undone
 
 @dataclass(frozen=True)
 class Step:
-    """Marks, the yaml that says so, and what was wrong with it.
+    """Marks, the yaml that says so, and what was wrong with it."""
 
-    Attributes:
-      marks: as drawn.
-      yaml: the text of NAME.yaml then; None: there was none.
-      problem: why these marks could not be written to it; None: they are what it says.
-    """
-
-    marks: Marks
-    yaml: str | None
+    marks: Marks  # as drawn
+    yaml: str | None  # the text of NAME.yaml then; None: there was none
+    # Why these marks could not be written to it; None: they are what it says.
     problem: str | None = None
 
 
@@ -85,17 +80,11 @@ class Table(Opened):
 
 @dataclass(frozen=True)
 class Sheet(Opened):
-    """A film with its marks.
-
-    Attributes:
-      info: of the film.
-      history: of the marks.
-      is_drawn: whether a person or a proposal has drawn anything yet.
-    """
+    """A film with its marks."""
 
     info: VideoInfo
     history: History
-    is_drawn: bool = True
+    is_drawn: bool = True  # whether a person or a proposal has drawn anything yet
 
     @property
     def marks(self) -> Marks:

@@ -29,20 +29,14 @@ Kind = Literal["progress", "partial", "done", "error", "cancelled"]
 
 @dataclass(frozen=True)
 class Message:
-    """What a job says.
+    """What a job says."""
 
-    Attributes:
-      job: its number.
-      task: what it does.
-      kind: `progress` with (stage, share), `partial` or `done` with a mapping, `error` with a
-        line, `cancelled`.
-      content: see `kind`.
-    """
-
-    job: int
-    task: str
+    job: int  # its number
+    task: str  # what it does
+    # `progress` with (stage, share), `partial` or `done` with a mapping, `error` with a line,
+    # `cancelled`.
     kind: Kind
-    content: Any = None
+    content: Any = None  # see `kind`
 
 
 @dataclass(frozen=True)

@@ -15,52 +15,33 @@ ENDS = {"rectangle": CORNERS, "stick": ("stick1", "stick2")}  # what of a mark c
 
 @dataclass(frozen=True)
 class ObjectMark:
-    """One object.
-
-    Attributes:
-      name: its own.
-      point: its centre in the first frame, px.
-      shape: as in the yaml.
-      size_m: if it is known.
-      corrections: where it has been put right, by frame.
-    """
+    """One object."""
 
     name: str
-    point: Point | None = None
-    shape: str = "box"
-    size_m: tuple[float, ...] | None = None
-    corrections: tuple[Correction, ...] = ()
+    point: Point | None = None  # its centre in the first frame, px
+    shape: str = "box"  # as in the yaml
+    size_m: tuple[float, ...] | None = None  # if it is known
+    corrections: tuple[Correction, ...] = ()  # where it has been put right, by frame
 
 
 @dataclass(frozen=True)
 class Marks:
-    """All marks of a clip; points in pixels of the video, x right, y down.
+    """All marks of a clip; points in pixels of the video, x right, y down."""
 
-    Attributes:
-      scenario: what the clip shows.
-      fps: true frames per second.
-      objects: in the order in which they set out.
-      upper: a point on the ramp's surface, high up.
-      foot: where the ramp meets the table; without a table another point of its surface.
-      stick: the two ends of something whose length is known.
-      stick_m: that length, m; None: nobody has said yet.
-      first_frame: the frame from which on the clip counts.
-      last_frame: the last one that counts; None: that of the clip.
-      rectangle: the corners of a rectangle of known sides, in place of the stick, from the bottom
-        left one counter-clockwise.
-      rectangle_m: its width and height, m, as far as somebody has said; 0: not yet.
-    """
-
-    scenario: str = "ramp"
-    fps: float = 30.0
-    objects: tuple[ObjectMark, ...] = ()
-    upper: Point | None = None
+    scenario: str = "ramp"  # what the clip shows
+    fps: float = 30.0  # true frames per second
+    objects: tuple[ObjectMark, ...] = ()  # in the order in which they set out
+    upper: Point | None = None  # a point on the ramp's surface, high up
+    # Where the ramp meets the table; without a table another point of its surface.
     foot: Point | None = None
-    stick: tuple[Point, Point] | None = None
-    stick_m: float | None = None
-    first_frame: int = 0
-    last_frame: int | None = None
+    stick: tuple[Point, Point] | None = None  # the two ends of something whose length is known
+    stick_m: float | None = None  # that length, m; None: nobody has said yet
+    first_frame: int = 0  # the frame from which on the clip counts
+    last_frame: int | None = None  # the last one that counts; None: that of the clip
+    # The corners of a rectangle of known sides, in place of the stick, from the bottom left one
+    # counter-clockwise.
     rectangle: Corners | None = None
+    # Its width and height, m, as far as somebody has said; 0: not yet.
     rectangle_m: tuple[float, float] = (0.0, 0.0)
 
     @property

@@ -31,21 +31,14 @@ VIEWED = ("compare", "diagnose", "predict")  # whose results are not all in thei
 
 @dataclass(frozen=True)
 class Begun:
-    """What a job was begun with.
-
-    Attributes:
-      trials: the clips.
-      clip: the active one.
-      tracks: by clip what its track is made of.
-      of: what a result is made of, by task: that of the model, or of the marks alone.
-      undeclared: clips without a yaml.
-    """
+    """What a job was begun with."""
 
     trials: Trials
-    clip: str
-    tracks: Mapping[str, str]
+    clip: str  # the active one
+    tracks: Mapping[str, str]  # by clip what its track is made of
+    # What a result is made of, by task: that of the model, or of the marks alone.
     of: Mapping[str, str]
-    undeclared: frozenset[str]
+    undeclared: frozenset[str]  # clips without a yaml
 
 
 class Session(Clips):

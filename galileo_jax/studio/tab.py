@@ -10,38 +10,25 @@ from galileo_jax.studio.session import Session
 
 @dataclass
 class Tab:
-    """What one tab shows.
+    """What one tab shows."""
 
-    Attributes:
-      session: the clips and results.
-      stage: the panel.
-      candidate: whose curve is looked at.
-      placing: what a click into the video places: a new object, or one that is put right; "":
-        nothing.
-      frame: that is shown.
-      is_writing, draft: whether an effect is being written, and its text; None: as saved.
-      dark: the colours.
-      said: the job, the error and the note that are shown.
-      drawn, lamps: what the panel and the row of stages were built of.
-      refresh: does that.
-      redraw: shows everything anew.
-      redraw_curves: only the video and what is below it.
-    """
-
-    session: Session
-    stage: str = "explain"
-    candidate: str = ""
+    session: Session  # the clips and results
+    stage: str = "explain"  # the panel
+    candidate: str = ""  # whose curve is looked at
+    # What a click into the video places: a new object, or one that is put right; "": nothing.
     placing: str = ""
-    frame: int = 0
+    frame: int = 0  # that is shown
+    # Whether an effect is being written, and its text; None: as saved.
     is_writing: bool = False
     draft: str | None = None
-    dark: bool = False
-    said: tuple[str, str, str] = ("", "", "")
+    dark: bool = False  # the colours
+    said: tuple[str, str, str] = ("", "", "")  # the job, the error and the note that are shown
+    # What the panel and the row of stages were built of.
     drawn: Any = None
     lamps: Any = None
-    refresh: Callable[[], None] = lambda: None
-    redraw: Callable[[], None] = lambda: None
-    redraw_curves: Callable[[], None] = lambda: None
+    refresh: Callable[[], None] = lambda: None  # brings the panel up to date
+    redraw: Callable[[], None] = lambda: None  # shows everything anew
+    redraw_curves: Callable[[], None] = lambda: None  # only the video and what is below it
 
     @property
     def is_idle(self) -> bool:
