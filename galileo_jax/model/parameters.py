@@ -202,17 +202,13 @@ class PriorTable(NamedTuple):
 
     def forward(self, z: Numbers) -> Any:
         """As the function `forward`: `z` `[..., parameter]` to the parameters' units."""
-        share = ndtr(z)
-        half = ndtri(0.5 + 0.5 * jnp.clip(share, 0.0, 1 - 1e-12))
-        # Of a kind that is not chosen nothing may overflow: its derivative would be NaN.
-        is_grown = (self.kind == 1) | (self.kind == 4)
-        far = jnp.where(self.kind == 4, _stretched(z), z)
-        grown = jnp.exp(jnp.where(is_grown, self.b * far, 0.0))
-        return jnp.select(
-            [self.kind == 0, is_grown, self.kind == 2],
-            [self.a + self.b * z, self.a * grown, self.a + (self.b - self.a) * share],
-            self.a * half,
-        )
+        theta = jnp.zeros_like(z)
+        for kind, prior in enumerate(KINDS):
+            chosen = self.kind == kind
+            # Of a kind that is not chosen nothing may overflow: its derivative would be NaN.
+            found = prior.at(jnp.where(chosen, z, 0.0), self.a, self.b, jnp)
+            theta = jnp.where(chosen, found, theta)
+        return theta
 
     def in_units(self, z: np.ndarray) -> np.ndarray:
         """What `forward` gives, in NumPy: no program to load, no call to dispatch."""
