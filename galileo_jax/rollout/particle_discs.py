@@ -27,7 +27,7 @@ from galileo_jax.rollout.disc_hits import (
 )
 from galileo_jax.rollout.events import System, Task
 from galileo_jax.rollout.motion import Dynamics, state_at, total
-from galileo_jax.rollout.particle_free import start_velocity
+from galileo_jax.rollout.particle_free import magnified, start_velocity
 
 
 class DiscSystem(System):
@@ -35,7 +35,7 @@ class DiscSystem(System):
 
     def __init__(self, task: Task):
         super().__init__(task)
-        self.shown = _magnified(task)
+        self.shown = magnified(task.effects, task.named, task.scene, axis=0)
         self.table = _table(task, self.law, self.shown)
         velocity = start_velocity(task.effects, task.named, task.scene)
         assert velocity is not None  # the pucks' law gives one
@@ -124,15 +124,6 @@ def _table(task: Task, law: Dynamics, shown: jax.Array) -> Table:
         total([e.pressure(named, scene) for e in effects]),
         total([e.oval(named, scene) for e in effects]),
     )
-
-
-def _magnified(task: Task) -> jax.Array:
-    """How many times as large as they are the camera shows lengths (about object 1's start)."""
-    origin = jnp.asarray(task.scene.start_m)[:, :, None]
-    ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
-    for effect in task.effects:
-        ends = effect.measure(ends, task.named, task.scene)
-    return ends[0, 0, 1] - ends[0, 0, 0]
 
 
 def _lever(discs: Discs, table: Table) -> jax.Array:

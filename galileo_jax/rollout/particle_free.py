@@ -99,13 +99,20 @@ def floor_of(
         return None
     xp = floor.height_m.__array_namespace__()
     start = xp.asarray(scene.start_m)[0]
-    higher = [[0.0, 1.0 if axis == 1 else 0.0] for axis in range(scene.num_axes)]
-    seen = start[None, :, None] + xp.asarray(higher)[None]
+    depth = (start[1] - floor.height_m) / magnified(effects, theta, scene, axis=1)
+    return floor._replace(height_m=start[1] - xp.maximum(depth, xp.zeros_like(depth)))
+
+
+def magnified(
+    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings, axis: int
+) -> Any:
+    """How many times as large as they are lengths are seen along an axis, from the start on."""
+    xp = theta["m1"].__array_namespace__()
+    ahead = [[0.0, 1.0 if other == axis else 0.0] for other in range(scene.num_axes)]
+    ends = xp.asarray(scene.start_m)[:, :, None] + xp.asarray(ahead)
     for effect in effects:
-        seen = effect.measure(seen, theta, scene)
-    magnified = seen[0, 1, 1] - seen[0, 1, 0]
-    depth = xp.maximum((start[1] - floor.height_m) / magnified, xp.zeros_like(magnified))
-    return floor._replace(height_m=start[1] - depth)
+        ends = effect.measure(ends, theta, scene)
+    return ends[0, axis, 1] - ends[0, axis, 0]
 
 
 def rates(body: Body, time_s: Any, law: Dynamics, scene: Surroundings, rests: Any) -> Body:
