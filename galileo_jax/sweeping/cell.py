@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,8 +87,12 @@ class Packed:
     content: dict[str, bytes]
 
     @contextmanager
-    def unpacked(self) -> Iterator["Unpacked"]:
-        """The clip in a folder of its own; errors name the path that it came from."""
+    def unpacked(self) -> Iterator[tuple[Path, Callable[[str], str]]]:
+        """The clip in a folder of its own.
+
+        Yields its file, and what gives a text the names of files as they were where they came
+        from. Errors have these names, too.
+        """
         with tempfile.TemporaryDirectory(prefix="galileo.") as folder:
             for name, content in self.content.items():
                 file = Path(folder) / name
@@ -96,36 +100,18 @@ class Packed:
                 file.write_bytes(content)
             clip = Path(folder) / self.name
             origins = {clip.parent: Path(self.source).parent}
-            origins.setdefault(Path(folder), self.root)
-            here = Unpacked(clip, origins)
+            origins.setdefault(Path(folder), self.root)  # the innermost folder first
+
+            def as_named(text: str) -> str:
+                for here, there in origins.items():
+                    text = text.replace(f"{here}/", f"{there}/" if there != Path(".") else "")
+                    text = text.replace(str(here), str(there))
+                return text
+
             try:
-                yield here
+                yield clip, as_named
             except InputError as error:
-                raise InputError(here.text_of_origin(str(error))) from error
-
-
-@dataclass(frozen=True)
-class Unpacked:
-    """A clip in a folder that is not its own.
-
-    Attributes:
-      path: of the clip's file.
-      origins: folders here to the folders they stand for, the innermost first.
-    """
-
-    path: Path
-    origins: Mapping[Path, Path]
-
-    def origin(self, path: Path) -> Path:
-        """Where a file that is here came from."""
-        return Path(self.text_of_origin(str(path)))
-
-    def text_of_origin(self, text: str) -> str:
-        """A message with the names of files as they were where they came from."""
-        for here, there in self.origins.items():
-            text = text.replace(f"{here}/", f"{there}/" if there != Path(".") else "")
-            text = text.replace(str(here), str(there))
-        return text
+                raise InputError(as_named(str(error))) from error
 
 
 def _beside(path: Path) -> list[Path]:

@@ -60,14 +60,16 @@ def measure_files(packed: Packed) -> MeasuredClip:
     """
     from galileo_jax.api.explain import answered_clips
 
-    with packed.unpacked() as here:
-        (clip,), _ = answered_clips([here.path], {})
-        warnings = tuple(map(here.text_of_origin, clip.warnings))
-        named = {"path": here.origin(clip.path), "source": packed.source, "warnings": warnings}
+    with packed.unpacked() as (file, as_named):
+        (clip,), _ = answered_clips([file], {})
+        warnings = tuple(map(as_named, clip.warnings))
+        path = Path(as_named(str(clip.path)))
+        named = {"path": path, "source": packed.source, "warnings": warnings}
         measured = measure(clip.model_copy(update=named))
         clip = measured.clip
         picture = thumbnail(clip, measured.observation)
-        files = {key: here.origin(file) for key in FILES if (file := getattr(clip, key))}
+        own = {key: getattr(clip, key) for key in FILES}
+        files = {key: Path(as_named(str(file))) for key, file in own.items() if file}
         clip = clip.model_copy(update=files)
     return MeasuredClip(replace(measured, clip=clip, pixels=None), picture)
 
