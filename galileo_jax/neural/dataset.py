@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.task import Arrays, Trainable
+from galileo_jax.neural.task import Arrays, Task
 from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
@@ -18,7 +18,7 @@ INDEX = "data.json"
 DATA_KEYS = ("preset", "seed", "engine", "frames")  # what the samples depend on
 
 
-def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
+def load_or_make(task: Task, config: TrainConfig, folder: Path) -> Arrays:
     """All samples of a config, from `folder` or made now; reports "simulating" after each shard.
 
     `task`: makes samples. `config`: says how many; the same config gives the same samples.
@@ -50,6 +50,6 @@ def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
     return {name: values[: config.samples] for name, values in joined.items()}
 
 
-def make_samples(task: Trainable, seed: int, shard: int, count: int) -> Arrays:
+def make_samples(task: Task, seed: int, shard: int, count: int) -> Arrays:
     """New samples; every shard has its own stream of random numbers."""
     return task.make(jax.random.fold_in(jax.random.key(seed), shard), count)

@@ -23,6 +23,7 @@ from flax import nnx
 
 NUM_TARGETS = 3
 FILTERS, KERNELS = (32, 32), (8, 2)  # strides as wide as kernels: products of matrices
+WIDTH, NUM_COMPONENTS = 128, 6  # of what conditions the density; of each number's mixture
 LARGEST_FEATURE = 8.0
 LARGEST_T = 6.0
 LEAST_LOG_SD, MOST_LOG_SD = -5.0, 2.0
@@ -62,11 +63,7 @@ class PosteriorNetwork(nnx.Module):
         num_channels: int,
         num_frames: int,
         rngs: nnx.Rngs,
-        *,
-        width: int = 128,
-        num_components: int = 6,
     ):
-        self.num_components = num_components
         sizes = (num_channels, *FILTERS)
         self.convolutions = nnx.List(
             [
@@ -76,11 +73,11 @@ class PosteriorNetwork(nnx.Module):
         )
         flat = FILTERS[-1] * num_frames // math.prod(KERNELS)
         self.profile = nnx.Linear(flat, 64, rngs=rngs)
-        self.trunk1 = nnx.Linear(num_features + 64, width, rngs=rngs)
-        self.trunk2 = nnx.Linear(width, width, rngs=rngs)
-        self.inner = nnx.List([nnx.Linear(width + i, 64, rngs=rngs) for i in range(NUM_TARGETS)])
+        self.trunk1 = nnx.Linear(num_features + 64, WIDTH, rngs=rngs)
+        self.trunk2 = nnx.Linear(WIDTH, WIDTH, rngs=rngs)
+        self.inner = nnx.List([nnx.Linear(WIDTH + i, 64, rngs=rngs) for i in range(NUM_TARGETS)])
         self.outer = nnx.List(
-            [nnx.Linear(64, 3 * num_components, rngs=rngs) for _ in range(NUM_TARGETS)]
+            [nnx.Linear(64, 3 * NUM_COMPONENTS, rngs=rngs) for _ in range(NUM_TARGETS)]
         )
         self.mean = Constant(jnp.zeros(num_features))
         self.sd = Constant(jnp.ones(num_features))
@@ -118,7 +115,7 @@ class PosteriorNetwork(nnx.Module):
         hidden = nnx.gelu(self.inner[i](jnp.concatenate([trunk, before], axis=-1)))
         weight, mean, log_sd = jnp.split(self.outer[i](hidden), 3, axis=-1)
         # Components start apart, from narrow to wide.
-        spread = jnp.linspace(-1.5, 1.5, self.num_components)
+        spread = jnp.linspace(-1.5, 1.5, NUM_COMPONENTS)
         log_sd = jnp.clip(log_sd + spread, LEAST_LOG_SD, MOST_LOG_SD)
         return Mixture(jax.nn.log_softmax(weight), mean, jnp.exp(log_sd))
 

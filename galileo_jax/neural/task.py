@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol
 
 from galileo_jax.runtime.registry import Registry
 
@@ -17,9 +17,8 @@ else:
     Arrays = dict  # NumPy is left out: every command registers presets here, also for a --help
 
 
-@runtime_checkable
-class Trainable(Protocol):
-    """Data, network and loss: what the training loop needs."""
+class Task(Protocol):
+    """A preset: data, network and loss, and what a trained network is tested on."""
 
     shard_size: int  # samples made at a time, and kept in one file
 
@@ -34,10 +33,6 @@ class Trainable(Protocol):
     def loss(self, network: Any, batch: "dict[str, jax.Array]") -> "jax.Array":
         """The mean loss of a batch."""
         ...
-
-
-class Task(Trainable, Protocol):
-    """A preset: it can be tested, too."""
 
     def test(self, network: Any, data: Arrays, seed: int) -> dict[str, float]:
         """What is to be reported of a trained network on new samples."""
@@ -70,7 +65,7 @@ PRESETS: "Registry[Callable[[TrainConfig], Task]]" = Registry(
 BENCHMARKS: Registry[Benchmark] = Registry("benchmark", "benchmarks")
 
 
-def make_task(config: "TrainConfig") -> "Task":
+def make_task(config: "TrainConfig") -> Task:
     """The task of a config.
 
     Raises:

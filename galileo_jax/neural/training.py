@@ -24,13 +24,13 @@ from galileo_jax.neural.checkpoint import (
     save_network,
 )
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.task import Arrays, Trainable
+from galileo_jax.neural.task import Arrays, Task
 from galileo_jax.runtime.progress import report
 
 SAVE_EVERY_S = 15.0
 
 
-def train(task: Trainable, config: TrainConfig, data: Arrays, folder: Path) -> Progress:
+def train(task: Task, config: TrainConfig, data: Arrays, folder: Path) -> Progress:
     """Trains, or goes on from the folder's latest checkpoint; writes `network.npz`.
 
     Reports "training" after every epoch, with the `Progress` as the partial result. Cancelled or
@@ -117,7 +117,7 @@ def _after_epoch(
 
 
 def _compile(
-    task: Trainable,
+    task: Task,
     structure: Any,
     constant: Any,
     adam: optax.GradientTransformation,

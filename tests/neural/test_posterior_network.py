@@ -9,7 +9,7 @@ FEATURES, CHANNELS, FRAMES = 7, 3, 16
 
 
 def network() -> PosteriorNetwork:
-    return PosteriorNetwork(FEATURES, CHANNELS, FRAMES, nnx.Rngs(0), width=16)
+    return PosteriorNetwork(FEATURES, CHANNELS, FRAMES, nnx.Rngs(0))
 
 
 def clip():

@@ -9,21 +9,15 @@ from galileo_jax.neural.dataset import load_or_make
 from galileo_jax.neural.training import cosine_rate, train
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import scope
+from galileo_jax.thesis.task import ThesisTask
 from tests.thesis.test_network import config
 
 
-class Toy:
+class Toy(ThesisTask):
     """The thesis's network on a line: no simulation, the same loop."""
 
     shard_size = 50
-
-    def __init__(self, settings):
-        from galileo_jax.thesis.task import ThesisTask
-
-        self._task = ThesisTask(settings)
-        self.loss = self._task.loss
-        self.network = self._task.network
-        self.made = 0
+    made = 0
 
     def make(self, key, count):
         import jax
