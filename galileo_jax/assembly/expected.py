@@ -13,16 +13,16 @@ import numpy as np
 
 from galileo_jax.assembly.board_path import board_shape
 from galileo_jax.assembly.level_starts import level_starts
-from galileo_jax.assembly.pendulum_expected import pendulum_expected
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sizes import volume_m3
 from galileo_jax.model.effects.air import expected_added_mass, expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
+from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import LAUNCH, StartVelocity
-from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
-from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
+from galileo_jax.model.effects.nuisances.declared import DeclaredAngle, DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
+from galileo_jax.numerics.least_squares import circle
 from galileo_jax.numerics.periodogram import period_s
 from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.observation.observation import Observation
@@ -39,6 +39,10 @@ DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half 
 SPIN_SD_RAD_S, SPIN_SD_SHARE = 3.0, 0.03  # as a camera that looks at the ball's marks tells it
 LAUNCH_SD_DEG = 0.5  # a launcher is set by a scale of degrees
 UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
+LENGTH_SD, ANGLE_SD_RAD = 0.3, 0.15  # of a thread's logarithm; of what the path tells
+SPEED_SD = 0.3  # of the speed of a fall through the length
+TAPE_M, PLACE_M = 0.002, 0.01  # how well a thread, and a pivot in the picture, are measured
+WIDE_RAD = 0.3  # of a path whose circle shows where the pivot is
 
 
 def expected(
@@ -68,10 +72,7 @@ def expected(
         return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
 
     if PENDULUM in SCENARIOS[clip.scenario].laws:
-        return {
-            **declared,
-            **pendulum_expected(clip, times_s, place_m, _start_velocity(times_s, place_m)),
-        }
+        return declared | _pendulum(clip, times_s, place_m, velocity)
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),
@@ -170,6 +171,46 @@ def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, ..
         return (0.0,) * len(place_m)
     after = times_s[:count] - times_s[0]
     return tuple(float(np.polyfit(after, row[:count], min(2, count - 1))[-2]) for row in place_m)
+
+
+def _pendulum(
+    clip: Clip, times_s: np.ndarray, place_m: np.ndarray, velocity: tuple[float, ...]
+) -> dict[str, tuple[float, float]]:
+    """The two numbers of each prior, by name.
+
+    The period tells the length in metres, whatever the scale; the circle that the path is on the
+    angle, or where it is too short for that its middle.
+
+    Args:
+      clip: what is declared.
+      times_s: `[frame]`, of frames in which the bob is seen.
+      place_m: `[axis, frame]`, as measured.
+      velocity: in the first of them, m/s.
+    """
+    x, y = place_m[0], place_m[1]
+    length = clip.gravity * (period_s(times_s, x) / (2 * math.pi)) ** 2
+    length_sd = LENGTH_SD
+    centre, radius = circle(x, y)
+    angles = np.arctan2(x - centre[0], centre[1] - y)
+    angle, angle_sd = float(angles[0]), ANGLE_SD_RAD
+    if np.ptp(angles) < WIDE_RAD or not math.isfinite(radius):
+        middle = 0.5 * (float(x.min()) + float(x.max()))
+        radius = length if clip.is_scale_known else max(10 * float(np.ptp(x)), 1e-3)
+        angle = math.asin(min(max((float(x[0]) - middle) / radius, -1.0), 1.0))
+    if clip.pivot_m is not None and clip.is_scale_known:
+        aside, above = x[0] - clip.pivot_m[0], clip.pivot_m[1] - y[0]
+        length = radius = float(np.hypot(aside, above))
+        angle, angle_sd = float(np.arctan2(aside, above)), PLACE_M / radius
+        length_sd = PLACE_M / length
+    if clip.thread_m is not None:
+        length, length_sd = clip.thread_m, TAPE_M / clip.thread_m
+    along = velocity[0] * math.cos(angle) + velocity[1] * math.sin(angle)
+    fall = math.sqrt(2 * clip.gravity * length)
+    return {
+        LENGTH: (length, length_sd),
+        ANGLE: (angle, angle_sd),
+        "start_speed": (along * length / radius, SPEED_SD * fall),
+    }
 
 
 def _density_ratio(clip: Clip) -> tuple[float, float]:

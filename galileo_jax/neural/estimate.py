@@ -13,8 +13,7 @@ import numpy as np
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.model.effects.effect import infers_gravity
-from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
-from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
+from galileo_jax.model.effects.nuisances.declared import DeclaredAngle, DeclaredScale
 from galileo_jax.model.model import MASS_PRIOR
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.checkpoint import load_network
@@ -44,9 +43,7 @@ def trained_network(path: Path = TRAINED) -> PosteriorNetwork:
     return network
 
 
-def cnn_posterior(
-    trials: JointProblem, seed: int, network: PosteriorNetwork | None = None
-) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+def cnn_posterior(trials: JointProblem, seed: int) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
     """Draws of the posterior of k1, k2 and the mass ratio; of all else, of the prior.
 
     The network is marginal over the nuisances; their draws are prior draws, independent of
@@ -70,22 +67,16 @@ def cnn_posterior(
         raise InputError("--method cnn: its network knows no effects; use --method grad")
     if infers_gravity(problem.model.nuisances):
         raise InputError("--method cnn: its network takes gravity as declared; use --method grad")
-    network = network or trained_network()
+    network = trained_network()
     seen = see(problem.observation, scene, is_filmed=problem.noise == "camera")
     summary = one_at_a_time(_summarise)(seen)
     found = _estimate(network, seen, summary, seed)
     theta = _complete(trials, found, seed)
-    middle = np.zeros(len(trials.names))
-    means = inverse(trials.parameters, np.asarray(theta.mean(0)))
-    for i, parameter in enumerate(trials.parameters):
-        if parameter.role == "main":
-            middle[i] = means[i]
-    complaint = _complaint(network, summary)
-    is_usual = not complaint
-    notes: dict[str, Any] = {
-        "status": "read off by the network" + ("" if is_usual else "; see the warning"),
-    }
-    if complaint:
+    is_main = np.array([parameter.role == "main" for parameter in trials.parameters])
+    middle = np.where(is_main, inverse(trials.parameters, theta.mean(0)), 0.0)
+    notes: dict[str, Any] = {"status": "read off by the network"}
+    if complaint := _complaint(network, summary):
+        notes["status"] += "; see the warning"
         notes["warnings"] = [
             f"this clip is unlike those that the network was trained on ({complaint}): do not "
             "trust its intervals; use --method grad"
@@ -94,7 +85,7 @@ def cnn_posterior(
         names=trials.names,
         draws=theta[None],
         log_density=np.zeros((1, len(theta))),
-        status=Status.CONVERGED if is_usual else Status.FIXED_LENGTH,
+        status=Status.FIXED_LENGTH if complaint else Status.CONVERGED,
         stats={"rollouts": 0.0},
         provenance={"method": "cnn", "seed": seed},
     )

@@ -21,9 +21,8 @@ from galileo_jax.measurement.errors_at_rest import LEAST_SCALE
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.nuisances import (
     NUISANCES,
-    contact_gap,
     foot_transition,
-    impact_momentum,
+    hits,
     impact_restitution,
 )
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
@@ -98,8 +97,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     foot = 1.0 + imperfect * foot_transition.EDGE_SD * normal()
     rebound = imperfect * impact_restitution.PRIOR.forward(normal())
     zero = jnp.zeros(())
-    overlap = imperfect * contact_gap.PRIOR.forward(normal())
-    passed_on = 1.0 + imperfect * impact_momentum.SD * normal()
+    overlap = imperfect * hits.GAP_PRIOR.forward(normal())
+    passed_on = 1.0 + imperfect * hits.MOMENTUM_SD * normal()
     theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, passed_on, overlap, instant])
     scene = _scene(angle, half_length, half_height, release, object2)
     position, velocity = roll_out(NUISANCES, NAMES, NUM_RECORDS, RECORD_DT_S, theta, scene)

@@ -7,8 +7,7 @@ import pytest
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.nuisances import NUISANCES
-from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
-from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
+from galileo_jax.model.effects.nuisances.declared import DeclaredAngle, DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant

@@ -33,13 +33,10 @@ class ConstantForce(Effect):
 
     def parameters(self, scene):
         pull = Parameter("constant_force", "N", PRIOR, 0.0, "effect", 0.05)
-        if not scene.crosses_foot:
-            return (pull,)
-        usual = LEVELNESS_PRIOR.mean  # means nothing while the force is absent
-        levelness = Parameter(
-            "constant_force_levelness", "1", LEVELNESS_PRIOR, usual, "effect", 0.1
-        )
-        return (pull, levelness)
+        name, prior = "constant_force_levelness", LEVELNESS_PRIOR
+        # It means nothing while the force is absent.
+        levelness = Parameter(name, "1", prior, prior.mean, "effect", 0.1)
+        return (pull, levelness) if scene.crosses_foot else (pull,)
 
     def force(self, theta, scene):
         pull = scene.only(theta["constant_force"], 0)

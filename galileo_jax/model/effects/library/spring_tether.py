@@ -23,13 +23,10 @@ class SpringTether(Effect):
 
     def parameters(self, scene):
         stiffness = Parameter("spring_tether", "N/m", PRIOR, 0.0, "effect", 0.1)
-        if not scene.crosses_foot:
-            return (stiffness,)
-        usual = STRAIGHTNESS_PRIOR.mean  # means nothing while the strength is absent
-        straightness = Parameter(
-            "spring_tether_straightness", "1", STRAIGHTNESS_PRIOR, usual, "effect", 0.1
-        )
-        return (stiffness, straightness)
+        name, prior = "spring_tether_straightness", STRAIGHTNESS_PRIOR
+        # It means nothing while the strength is absent.
+        straightness = Parameter(name, "1", prior, prior.mean, "effect", 0.1)
+        return (stiffness, straightness) if scene.crosses_foot else (stiffness,)
 
     def force(self, theta, scene):
         stiffness = scene.only(theta["spring_tether"], 0)

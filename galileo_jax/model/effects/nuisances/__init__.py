@@ -6,11 +6,9 @@ They are effects like any other; only their parameters' role differs
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.nuisances.board_shape import BoardShape
-from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
-from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
-from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
+from galileo_jax.model.effects.nuisances.declared import DeclaredAngle, DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
-from galileo_jax.model.effects.nuisances.impact_momentum import ImpactMomentum
+from galileo_jax.model.effects.nuisances.hits import ContactGap, ImpactMomentum
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
