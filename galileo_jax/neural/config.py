@@ -14,38 +14,29 @@ Count = Annotated[int, Field(gt=0)]
 
 
 class TrainConfig(BaseModel):
-    """Everything that decides what is learned.
-
-    Attributes:
-      preset: which network, data and loss.
-      seed: of data and weights.
-      samples: simulated experiments; the last `validation_share` of them validate.
-      batch: samples a step.
-      learning_rate: Adam's, to begin with.
-      schedule: "plateau": the rate is multiplied by `cut` after `patience` epochs without a
-        better validation loss, `cuts` times, and the next plateau is the end; "cosine": it
-        stays for a third of `max_epochs`, and falls to zero along a cosine from there on.
-      cut, patience, cuts: of schedule "plateau".
-      max_epochs: the end at the latest.
-      engine: that makes the data.
-      frames: displacements in a profile (thesis).
-    """
+    """Everything that decides what is learned."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    # Which network, data and loss
     preset: Annotated[str, AfterValidator(lambda name: PRESETS[name] and name)]
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0)] = 0  # of data and weights
+    # Simulated experiments; the last `validation_share` of them validate
     samples: Annotated[int, Field(ge=100)]
     validation_share: Share = 0.1
-    batch: Count
-    learning_rate: Annotated[float, Field(gt=0)]
+    batch: Count  # samples a step
+    learning_rate: Annotated[float, Field(gt=0)]  # Adam's, to begin with
+    # "plateau": the rate is multiplied by `cut` after `patience` epochs without a better validation
+    # loss, `cuts` times, and the next plateau is the end; "cosine": it stays for a third of
+    # `max_epochs`, and falls to zero along a cosine from there on
     schedule: Literal["plateau", "cosine"] = "plateau"
+    # The next three are of schedule "plateau"
     cut: Share = 0.1
     patience: Count = 10
     cuts: Annotated[int, Field(ge=0)] = 3
-    max_epochs: Count
-    engine: Literal["auto", "rigid", "c", "mjx"] = "auto"
-    frames: Annotated[int, Field(ge=25, le=400)] = 60
+    max_epochs: Count  # the end at the latest
+    engine: Literal["auto", "rigid", "c", "mjx"] = "auto"  # that makes the data
+    frames: Annotated[int, Field(ge=25, le=400)] = 60  # displacements in a profile (thesis)
 
 
 def load_config(path: Path, **overrides: object) -> TrainConfig:

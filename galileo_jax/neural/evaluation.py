@@ -13,17 +13,12 @@ TEST_SHARD = 2**30  # beyond any training set's
 
 
 class Evaluation(NamedTuple):
-    """What a test found.
+    """What a test found."""
 
-    Attributes:
-      found: measure to its value, such as a mean absolute error in the parameter's unit.
-      reference: what others reach in the same test; may be empty.
-      num_samples: on which it was tested.
-    """
-
+    # Measure to its value, such as a mean absolute error in the parameter's unit
     found: dict[str, float]
-    reference: dict[str, float]
-    num_samples: int = NUM_TEST
+    reference: dict[str, float]  # what others reach in the same test; may be empty
+    num_samples: int = NUM_TEST  # on which it was tested
 
 
 def evaluate_network(path: Path) -> Evaluation:

@@ -17,32 +17,23 @@ LEAST_NOISE_M = 5e-6  # of the simulated clips; a more certain tracker is taken 
 
 
 class Seen(NamedTuple):
-    """An observation and what is declared about its scene; leading axes `[...]` in batches.
+    """An observation and what is declared about its scene; leading axes `[...]` in batches."""
 
-    Attributes:
-      times_s: `[frame]`, evenly spaced.
-      position_m: `[object, 2, frame]`, 0 where masked.
-      mask: `[object, frame]`.
-      noise_m: `[object]`, the tracker's own standard deviation of a coordinate while it moves.
-      angle_rad, gravity: of the scene.
-      half_length_m, half_height_m: `[object]`.
-      is_ideal: 1.0 where nothing but noise stands between the rigid bodies and their
-        positions (a simulated world, the thesis's priors); 0.0 for clips.
-      is_filmed: 1.0 where a camera saw the bodies; 0.0 for positions in metres of unknown origin.
-      is_tracked_here: 1.0 where our own tracker found them in the pictures.
-    """
-
-    times_s: jax.Array
-    position_m: jax.Array
-    mask: jax.Array
+    times_s: jax.Array  # `[frame]`, evenly spaced
+    position_m: jax.Array  # `[object, 2, frame]`, 0 where masked
+    mask: jax.Array  # `[object, frame]`
+    # `[object]`, the tracker's own standard deviation of a coordinate while it moves
     noise_m: jax.Array
-    angle_rad: jax.Array
-    gravity: jax.Array
-    half_length_m: jax.Array
+    angle_rad: jax.Array  # of the scene's ramp
+    gravity: jax.Array  # m/s^2
+    half_length_m: jax.Array  # `[object]`
     half_height_m: jax.Array
+    # 1.0 where nothing but noise stands between the rigid bodies and their positions (a simulated
+    # world, the thesis's priors); 0.0 for clips
     is_ideal: jax.Array
+    # 1.0 where a camera saw the bodies; 0.0 for positions in metres of unknown origin
     is_filmed: jax.Array
-    is_tracked_here: jax.Array
+    is_tracked_here: jax.Array  # 1.0 where our own tracker found them in the pictures
 
 
 def see(observation: Observation, scene: Surroundings, is_filmed: bool = True) -> Seen:

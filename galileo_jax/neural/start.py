@@ -28,17 +28,12 @@ NUM_COMPLETIONS = 4
 
 @dataclass(frozen=True)
 class Start:
-    """Where chains begin.
+    """Where chains begin."""
 
-    Attributes:
-      fit: the mode next to the network's middle, and its covariance: the first proposals.
-      z: `[chain, parameter]`, a start for every chain.
-      notes: for result.json; `warnings` where the clip is unlike the training clips.
-    """
-
+    # The mode next to the network's middle, and its covariance: the first proposals
     fit: GradientFit
-    z: np.ndarray
-    notes: dict[str, Any]
+    z: np.ndarray  # `[chain, parameter]`, a start for every chain
+    notes: dict[str, Any]  # for result.json; `warnings` where the clip is unlike the training clips
 
 
 def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Start:

@@ -33,24 +33,19 @@ DECLARED = {
 
 
 class Summary(NamedTuple):
-    """What is left of a track.
+    """What is left of a track."""
 
-    Attributes:
-      moves, is_hit: whether object 1 slides, whether object 2 is hit.
-      centre, scale: `[3]`, estimates of `world.targets` and their errors, in the same space; 0
-        and 1 (the prior) where there is none.
-      features: `[feature]`, all that may tell how good the estimates are; of order one.
-      misfit: how far from its parabola object 1 is on the ramp, root mean square, in units of
-        tracking noise and what a camera's keystone makes of a parabola.
-      profile: `[channel, frame]`, velocities of both objects, masks, and residuals of the fits.
-    """
-
-    moves: jax.Array
-    is_hit: jax.Array
+    moves: jax.Array  # whether object 1 slides
+    is_hit: jax.Array  # whether object 2 is hit
+    # `[3]`, estimates of `world.targets` and their errors, in the same space; 0 and 1 (the prior)
+    # where there is none
     centre: jax.Array
     scale: jax.Array
-    features: jax.Array
+    features: jax.Array  # `[feature]`, all that may tell how good the estimates are; of order one
+    # `[channel, frame]`, velocities of both objects, masks, and residuals of the fits
     profile: jax.Array
+    # How far from its parabola object 1 is on the ramp, root mean square, in units of tracking
+    # noise and what a camera's keystone makes of a parabola
     misfit: jax.Array
 
 

@@ -45,18 +45,13 @@ class Task(Protocol):
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A setting to test a network in.
+    """A setting to test a network in."""
 
-    Attributes:
-      name: in the registry, and before its figures.
-      draw: makes so many samples from a key, in the form `GalileoTask.make` gives, and with them
-        `collides`: whether object 2 is hit.
-      reference: what is expected, by the figure's name.
-    """
-
-    name: str
+    name: str  # in the registry, and before its figures
+    # Makes so many samples from a key, in the form `GalileoTask.make` gives, and with them
+    # `collides`: whether object 2 is hit
     draw: "Callable[[jax.Array, int], Arrays]"
-    reference: Mapping[str, float]
+    reference: Mapping[str, float]  # what is expected, by the figure's name
 
 
 PRESETS: "Registry[Callable[[TrainConfig], Task]]" = Registry(

@@ -56,18 +56,13 @@ def restricted_likelihood(
 
 
 class Line(NamedTuple):
-    """The straight line of least summed squared distances from points of a plane.
+    """The straight line of least summed squared distances from points of a plane."""
 
-    Attributes:
-      middle: `[2]`, of the points.
-      along, across: `[2]`, unit vectors; along points to what is farthest from the first point.
-      spread: summed squares across and along.
-    """
-
-    middle: Float[np.ndarray, "2"]
+    middle: Float[np.ndarray, "2"]  # of the points
+    # Unit vectors; `along` points to what is farthest from the first point
     along: Float[np.ndarray, "2"]
     across: Float[np.ndarray, "2"]
-    spread: tuple[float, float]
+    spread: tuple[float, float]  # summed squares across and along
 
 
 def line_through(points: Float[np.ndarray, "2 point"]) -> Line:

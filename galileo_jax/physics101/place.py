@@ -42,23 +42,14 @@ BY_OBJECT = ("point_px", "first_frame")
 
 @dataclass(frozen=True)
 class Place:
-    """Where a clip stands in the data set.
+    """Where a clip stands in the data set."""
 
-    Attributes:
-      video: the file.
-      root: the folder of the scenarios, with `labels.yaml`.
-      scenario: a name in `SCENARIOS`.
-      folders: the three below the scenario.
-      setup: the one of them that names the set-up.
-      object: the one that names the object.
-    """
-
-    video: Path
-    root: Path
-    scenario: str
-    folders: tuple[str, str, str]
-    setup: str
-    object: str
+    video: Path  # the file
+    root: Path  # the folder of the scenarios, with `labels.yaml`
+    scenario: str  # a name in `SCENARIOS`
+    folders: tuple[str, str, str]  # the three below the scenario
+    setup: str  # the one of them that names the set-up
+    object: str  # the one that names the object
 
     @property
     def labels(self) -> Path:

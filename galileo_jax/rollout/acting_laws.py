@@ -45,20 +45,14 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """Part of a model.
+    """Part of a model."""
 
-    Attributes:
-      effects: that may act, nuisances among them.
-      names: of their parameters, after those of no effect.
-      columns: `[name]`, where these stand among the model's parameters and, after them, `absent`.
-      absent: values at which effects that the model does not have do nothing.
-      laws: those of `effects` that do not act in every rollout, and where these stand there.
-    """
-
-    effects: tuple[Effect, ...]
-    names: tuple[str, ...]
+    effects: tuple[Effect, ...]  # that may act, nuisances among them
+    names: tuple[str, ...]  # of their parameters, after those of no effect
+    # `[name]`, where these stand among the model's parameters and, after them, `absent`
     columns: np.ndarray
-    absent: np.ndarray
+    absent: np.ndarray  # values at which effects that the model does not have do nothing
+    # Those of `effects` that do not act in every rollout, and where these stand there
     laws: tuple[tuple[int, Law], ...] = ()
 
     def of(self, theta: Any) -> Any:

@@ -24,21 +24,13 @@ NAME_LENGTH = 40  # of the part that is there to be read
 
 @dataclass(frozen=True)
 class ClipFiles:
-    """A clip as it lies on disk.
+    """A clip as it lies on disk."""
 
-    Attributes:
-      source: the clip as it was named: its video, its yaml, or its track.
-      name: that it goes by.
-      root: a folder above all its files.
-      paths: its files, as far as they are there.
-      digest: of the files' content.
-    """
-
-    source: str
-    name: str
-    root: Path
-    paths: tuple[Path, ...]
-    digest: str
+    source: str  # the clip as it was named: its video, its yaml, or its track
+    name: str  # that it goes by
+    root: Path  # a folder above all its files
+    paths: tuple[Path, ...]  # its files, as far as they are there
+    digest: str  # of the files' content
 
     @classmethod
     def of(cls, source: str | Path) -> "ClipFiles":
@@ -72,19 +64,12 @@ class ClipFiles:
 
 @dataclass(frozen=True)
 class Packed:
-    """A clip as it travels.
+    """A clip as it travels."""
 
-    Attributes:
-      source: where it came from, as it was named.
-      root: the folder that its files were below.
-      name: of the clip's own file among them.
-      content: of the files, by their path below the root.
-    """
-
-    source: str
-    root: Path
-    name: str
-    content: dict[str, bytes]
+    source: str  # where it came from, as it was named
+    root: Path  # the folder that its files were below
+    name: str  # of the clip's own file among them
+    content: dict[str, bytes]  # of the files, by their path below the root
 
     @contextmanager
     def unpacked(self) -> Iterator[tuple[Path, Callable[[str], str]]]:

@@ -33,21 +33,17 @@ ClipName = Annotated[str, Field(strict=True, min_length=1)]
 
 
 class Simulated(BaseModel):
-    """Clips to be made with `galileo simulate`.
-
-    Attributes:
-      count: how many; the first has `seed`, the next one more.
-      effect: hidden in them.
-      strength: of the effect, from 0 to 1; drawn where it is not given.
-      video: rendered and to be tracked; else tracks in metres.
-    """
+    """Clips to be made with `galileo simulate`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    # How many; the first has `seed`, the next one more
     count: Annotated[int, Field(strict=True, ge=1)]
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
-    effect: Annotated[str, Field(strict=True)] | None = None
+    effect: Annotated[str, Field(strict=True)] | None = None  # hidden in them
+    # Of the effect, from 0 to 1; drawn where it is not given
     strength: Annotated[float, Field(gt=0, le=1)] | None = None
+    # Rendered and to be tracked; else tracks in metres
     video: Annotated[bool, Field(strict=True)] = False
 
     def made(self, folder: Path) -> list[Path]:
@@ -70,26 +66,21 @@ class Simulated(BaseModel):
 
 
 class SweepConfig(BaseModel):
-    """What a sweep does; see the module for an example.
-
-    Attributes:
-      simulate: clips that are made for it.
-      clips: files or patterns, relative to where the command is called; those of a list within
-        the list are trials of the same objects and fitted together.
-      common: options of every cell; see `settings` for those of each method.
-      grid: options with several values each, of which all combinations are taken.
-      list: options that go together, one entry after the other.
-      reports: whether each cell gets a page of its own, which takes about a second and 2 to 5 MB;
-        None: where a sweep has up to 60 cells.
-    """
+    """What a sweep does; see the module for an example."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    simulate: tuple[Simulated, ...] = ()
+    simulate: tuple[Simulated, ...] = ()  # clips that are made for it
+    # Files or patterns, relative to where the command is called; those of a list within the list
+    # are trials of the same objects and fitted together
     clips: tuple[ClipName | tuple[ClipName, ...], ...] = ()
-    common: dict[str, Any] = {}
+    common: dict[str, Any] = {}  # options of every cell; see `settings` for those of each method
+    # Options with several values each, of which all combinations are taken
     grid: dict[str, Annotated[list[Any], Field(min_length=1)]] = {}
+    # Whether each cell gets a page of its own, which takes about a second and 2 to 5 MB; None:
+    # where a sweep has up to 60 cells
     reports: Annotated[bool, Field(strict=True)] | None = None
+    # Options that go together, one entry after the other
     list: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)] = ({},)
 
     def all_settings(self) -> tuple[Settings, ...]:

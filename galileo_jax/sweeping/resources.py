@@ -12,15 +12,10 @@ from galileo_jax.runtime.errors import InputError
 
 @dataclass(frozen=True)
 class Resources:
-    """Of one worker.
+    """Of one worker."""
 
-    Attributes:
-      cpus: cores.
-      gpus: whole GPUs; 0: the worker computes on the CPU, whatever there is.
-    """
-
-    cpus: int = 1
-    gpus: int = 0
+    cpus: int = 1  # cores
+    gpus: int = 0  # whole GPUs; 0: the worker computes on the CPU, whatever there is
 
     def environment(self) -> dict[str, str]:
         """Variables of a worker's process.

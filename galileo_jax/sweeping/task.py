@@ -13,31 +13,22 @@ MAX_TRIES = 3  # of a task whose worker died: the third death is no accident
 
 @dataclass(frozen=True)
 class Task:
-    """A call that can be made anywhere: function and arguments can be pickled.
+    """A call that can be made anywhere: function and arguments can be pickled."""
 
-    Attributes:
-      key: of the task, unique among those given to an engine together.
-    """
-
-    key: str
+    key: str  # of the task, unique among those given to an engine together
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no result.
+    """Why there is no result."""
 
-    Attributes:
-      kind: "input": the clip or the call is wrong; "bug": anything else that was raised;
-        "died": the worker did, each time.
-      line: the reason in one line.
-      details: the traceback of a bug.
-    """
-
+    # "input": the clip or the call is wrong; "bug": anything else that was raised; "died": the
+    # worker did, each time
     kind: Literal["input", "bug", "died"]
-    line: str
-    details: str = ""
+    line: str  # the reason in one line
+    details: str = ""  # the traceback of a bug
 
 
 @dataclass(frozen=True)

@@ -25,29 +25,21 @@ FILES = ("video", "track")  # of a clip, beside its yaml
 
 @dataclass(frozen=True)
 class MeasuredClip:
-    """A clip as it was tracked.
+    """A clip as it was tracked."""
 
-    Attributes:
-      measurement: without its track in pixels.
-      thumbnail: a picture from the middle of its motion, JPEG; None of a clip without a video.
-    """
-
-    measurement: Measurement
+    measurement: Measurement  # without its track in pixels
+    # A picture from the middle of its motion, JPEG; None of a clip without a video
     thumbnail: bytes | None = None
 
 
 @dataclass(frozen=True)
 class CellResult:
-    """What came of a cell.
+    """What came of a cell."""
 
-    Attributes:
-      document: result.json as `galileo fit` writes it, or diagnosis.json; of
-        `explain` that of its fit.
-      files: what lies beside it, by path in the cell's folder: the page; of a fit the run; of
-        `explain` compare.json and, where something is missing, diagnosis.json.
-    """
-
+    # result.json as `galileo fit` writes it, or diagnosis.json; of `explain` that of its fit
     document: Mapping[str, Any]
+    # What lies beside it, by path in the cell's folder: the page; of a fit the run; of `explain`
+    # compare.json and, where something is missing, diagnosis.json
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
