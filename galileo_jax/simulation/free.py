@@ -180,22 +180,17 @@ def _swung(pendulum: Pendulum, times: np.ndarray) -> Motion:
     return Motion(times, position, velocity, np.zeros((1, len(times))))
 
 
+Change = Callable[[float, np.ndarray], np.ndarray]
+"""Time and state to the state's rate."""
+
+
 class Stretch(NamedTuple):
     """How a motion goes on, up to its next event."""
 
     state: np.ndarray  # where it begins
-    change: Callable[[float, np.ndarray], np.ndarray]  # time and state to the state's rate
+    change: Change
     # Time and state to what falls through zero at the event
     event: Callable[[float, np.ndarray], float]
-
-
-class Integrated(NamedTuple):
-    """A motion."""
-
-    states: np.ndarray  # `[time, number]`
-    # `[time]`, what moved it then, as of `Stretch`
-    changes: list[Callable[[float, np.ndarray], np.ndarray]]
-    events_s: tuple[float, ...]  # when there was an event
 
 
 def by_events(
@@ -203,28 +198,27 @@ def by_events(
     state: np.ndarray,
     times_s: np.ndarray,
     tolerances: tuple[float, float],
-) -> Integrated:
+) -> tuple[np.ndarray, list[Change], tuple[float, ...]]:
     """The motion at some times, from event to event (Dormand and Prince, order 8).
 
     `stretch`: of time, state, and whether an event is there, which it carries out. `state`: at the
     first of the times. `tolerances`: relative, absolute.
+
+    Returns:
+      states `[time, number]`, what moved it at each time, and when there was an event, s.
     """
     states, changes, events = np.empty((len(times_s), len(state))), [], []
     begin, time = 0, float(times_s[0])
     while begin < len(times_s):
         begins, change, event = stretch(time, state, bool(events))
-
-        def falls(t: float, y: np.ndarray, event=event) -> float:
-            return event(t, y)
-
-        falls.terminal, falls.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
+        event.terminal, event.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
         found = solve_ivp(
             change,
             (time, times_s[-1]),
             begins,
             method="DOP853",
             dense_output=True,
-            events=falls,
+            events=event,
             rtol=tolerances[0],
             atol=tolerances[1],
         )
@@ -235,4 +229,4 @@ def by_events(
         if found.status != 1:
             break
         events.append(time)
-    return Integrated(states, changes, tuple(events))
+    return states, changes, tuple(events)
