@@ -64,8 +64,8 @@ class Rim(NamedTuple):
             -4.0 * bulge,
         )
 
-    def of(self, index: int) -> "Rim":
-        """That of one disc."""
+    def of(self, index: int | jax.Array) -> "Rim":
+        """That of one disc, or those of some."""
         return Rim(self.radius_m[index], self.oval[index], self.turned_rad[index])
 
 
@@ -171,7 +171,7 @@ def _facing(
         return apart / distance, gap, jnp.ones(2), jnp.zeros(2)
     direction, gap = facing(apart, rim.of(one), rim.of(other))
     normal = jnp.stack([jnp.cos(direction), jnp.sin(direction)])
-    return normal, gap, *_shares(rim, direction, (one, other))
+    return normal, gap, *_shares(rim.of(jnp.array([one, other])), direction)
 
 
 def after_hit(discs: Discs, speed_m_s: jax.Array, pair: np.ndarray, table: Table) -> jax.Array:
@@ -196,13 +196,10 @@ def after_hit(discs: Discs, speed_m_s: jax.Array, pair: np.ndarray, table: Table
     return speed_m_s.at[other].add(change * inverse[1]).at[one].add(back * inverse[0])
 
 
-def _shares(
-    rim: Rim, direction: jax.Array, which: tuple[int, int] | None = None
-) -> tuple[jax.Array, jax.Array]:
+def _shares(rims: Rim, direction: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Where rims touch in a direction, along and across it, as shares of their radii."""
-    chosen = rim if which is None else jax.tree.map(lambda each: each[jnp.array(which)], rim)
-    reach, side, _ = chosen.reach_m(direction)
-    return reach / chosen.radius_m, side / chosen.radius_m
+    reach, side, _ = rims.reach_m(direction)
+    return reach / rims.radius_m, side / rims.radius_m
 
 
 def _impulse(

@@ -57,11 +57,6 @@ class Events(NamedTuple):
     soonest: Number
 
 
-class _Seen(NamedTuple):
-    now: Bodies
-    at_records: Bodies
-
-
 class PathSystem(System):
     """Bodies on their path."""
 
@@ -94,18 +89,19 @@ class PathSystem(System):
         whole_s = PART * self.dt_s
         since_s = jnp.arange(PART) * self.dt_s
 
-        def advance(carry: _Seen, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        def advance(
+            carry: tuple[Bodies, Bodies], time_s: jax.Array, left_s: jax.Array, is_last: jax.Array
+        ):
             bodies, seen = carry
             after, t, a = self._to_next_event(bodies, time_s, left_s, is_last)
             passed = since_s - (whole_s - left_s)  # since this phase began
             moved = bodies.after(a, passed)
             seen = jax.tree.map(lambda new, old: jnp.where(passed >= 0, new, old), moved, seen)
-            return _Seen(after, seen), t
+            return (after, seen), t
 
         unseen = jax.tree.map(lambda number: jnp.broadcast_to(number, since_s.shape), bodies)
-        start, most = _Seen(bodies, unseen), PART * self.most_events
-        end = step_by_events(advance, start, first * self.dt_s, whole_s, most)
-        return end.now, end.at_records
+        most = PART * self.most_events
+        return step_by_events(advance, (bodies, unseen), first * self.dt_s, whole_s, most)
 
     def _to_next_event(
         self, bodies: Bodies, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array
