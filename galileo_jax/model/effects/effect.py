@@ -180,6 +180,10 @@ class Surroundings:
         xp = mass[0].__array_namespace__()
         return xp.stack(mass, axis=-1) * xp.asarray(self.gravity)[..., None]
 
+    def numbered(self, *names: str) -> list[list[str]]:
+        """The parameters that each object has of its own, NAME1 and so on: `[object][name]`."""
+        return [[f"{name}{i + 1}" for name in names] for i in range(len(self.names))]
+
     def only(self, value: Any, *objects: int) -> Array:
         """`value` `[...]` for the given objects (counted from 0), 0 for others: `[..., object]`."""
         chosen = [1.0 if i in objects else 0.0 for i in range(len(self.names))]

@@ -22,9 +22,9 @@ Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase f
 
 from galileo_jax.model.effects import Effect, Normal, Parameter, Rims, Role, Uniform, by_object
 
-OFFSET = (
-    "hit_offset"  # in `Surroundings.expected`: how well places relative to each other are known
-)
+# In `Surroundings.expected`: how well places relative to each other are known.
+OFFSET = "hit_offset"
+OFFSETS = (f"{OFFSET}_x", f"{OFFSET}_y")
 START = ("start_velocity_x", "start_velocity_y", "start_turning")
 
 
@@ -37,8 +37,8 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
         roles: tuple[Role, ...] = ("main", "main", "main" if scene.num_axes == 3 else "nuisance")
         found = [
             Parameter(name, unit, Normal(*scene.expected[name]), 0.0, role, 0.05, per_clip=True)
-            for i in range(len(scene.names))
-            for name, unit, role in zip(_starts(i), units, roles, strict=True)
+            for own in scene.numbered(*START)
+            for name, unit, role in zip(own, units, roles, strict=True)
             if name in scene.expected
         ]
         if len(scene.names) > 1:
@@ -48,19 +48,18 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
             ]
             place = Normal(*scene.expected[OFFSET])
             found += [
-                Parameter(f"{OFFSET}_{axis}{i + 1}", "m", place, 0.0, "nuisance", 0.1)
-                for i in range(1, len(scene.names))
-                for axis in "xy"
+                Parameter(name, "m", place, 0.0, "nuisance", 0.1)
+                for own in scene.numbered(*OFFSETS)[1:]
+                for name in own
             ]
         return tuple(found)
 
     def start_velocity(self, theta, scene):
-        return by_object(theta, [_starts(i) for i in range(len(scene.names))])
+        return by_object(theta, scene.numbered(*START))
 
     def rims(self, theta, scene):
         zero = 0.0 * theta["m1"]
-        numbers = range(1, len(scene.names) + 1)
-        places = by_object(theta, [[f"{OFFSET}_{axis}{i}" for axis in "xy"] for i in numbers])
+        places = by_object(theta, scene.numbered(*OFFSETS))
         return Rims(theta.get("restitution", zero), theta.get("grip", zero), places)
 
     def derived(self, theta, scene):
@@ -73,8 +72,3 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
             )
             for i in range(len(scene.names))
         }
-
-
-def _starts(i: int) -> tuple[str, ...]:
-    """Names of a puck's start velocity and turning."""
-    return tuple(f"{name}{i + 1}" for name in START)

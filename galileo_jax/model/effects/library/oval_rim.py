@@ -15,6 +15,7 @@ Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), i
 
 from galileo_jax.model.effects import Effect, Normal, Parameter, Surroundings, by_object, register
 
+PARTS = ("oval_rim_c", "oval_rim_s")
 PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
 
 
@@ -30,13 +31,9 @@ class OvalRim(Effect, where=_can_meet):
     def parameters(self, scene):
         return tuple(
             Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
-            for i in range(len(scene.names))
-            for name in _names(i)
+            for own in scene.numbered(*PARTS)
+            for name in own
         )
 
     def oval(self, theta, scene):
-        return by_object(theta, [_names(i) for i in range(len(scene.names))])
-
-
-def _names(i: int) -> tuple[str, ...]:
-    return tuple(f"oval_rim_{part}{i + 1}" for part in "cs")
+        return by_object(theta, scene.numbered(*PARTS))

@@ -18,6 +18,7 @@ Confused with: nothing where the turning is in the data; else hardly seen at all
 
 from galileo_jax.model.effects import Effect, Normal, Parameter, by_object, register
 
+AXES = ("uneven_pressure_x", "uneven_pressure_y")
 PRIOR = Normal(0.0, 0.15)  # of a radius: a felt or a burr on one side
 
 
@@ -28,12 +29,9 @@ class UnevenPressure(Effect, where=lambda scene: scene.is_level):
     def parameters(self, scene):
         return tuple(
             Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
-            for i in range(len(scene.names))
-            for name in self._names(i)
+            for own in scene.numbered(*AXES)
+            for name in own
         )
 
     def pressure(self, theta, scene):
-        return by_object(theta, [self._names(i) for i in range(len(scene.names))])
-
-    def _names(self, i: int) -> tuple[str, ...]:
-        return tuple(f"{self.name}_{axis}{i + 1}" for axis in "xy")
+        return by_object(theta, scene.numbered(*AXES))
