@@ -18,7 +18,7 @@ from galileo_jax.rollout.mujoco_fields import (
     make_fields,
     make_loads,
     rigid_motion,
-    sliding_object,
+    sliding_objects,
     to_path,
 )
 
@@ -117,10 +117,7 @@ class EngineMJX:
         ratio = fields.mass / compiled.body_mass[1:]
         per_body = jnp.concatenate([jnp.ones(1), ratio])
         per_dof = jnp.repeat(ratio, 2)
-        solref = base.pair_solref
-        for i in range(compiled.npair):
-            if sliding_object(compiled.pair(i).name) is None:
-                solref = solref.at[i].set(fields.bumper)
+        hits = np.delete(np.arange(compiled.npair), sliding_objects(compiled)[0])
         return base.tree_replace(
             {
                 "body_mass": base.body_mass * per_body,
@@ -129,15 +126,11 @@ class EngineMJX:
                 "body_invweight0": base.body_invweight0 / per_body[:, None],
                 "dof_invweight0": base.dof_invweight0 / per_dof,
                 "pair_friction": self._rub(fields.friction),
-                "pair_solref": solref,
+                "pair_solref": base.pair_solref.at[hits].set(fields.bumper),
             }
         )
 
     def _rub(self, friction: jax.Array | np.ndarray) -> jax.Array:
         """The contact pairs' friction with the objects' coefficients `[object]` in it."""
-        pairs = self._base.pair_friction
-        for i in range(self.model.scene.model.npair):
-            which = sliding_object(self.model.scene.model.pair(i).name)
-            if which is not None:
-                pairs = pairs.at[i, :2].set(friction[which])
-        return pairs
+        sleds, objects = sliding_objects(self.model.scene.model)
+        return self._base.pair_friction.at[sleds, :2].set(friction[objects, None])

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from mujoco.batch import Batch
 
 from galileo_jax.model.effects.effect import Effect, State, Surroundings
@@ -165,10 +165,14 @@ def _foot_drag(log_kept: Array, state: State, law: Dynamics, scene: Surroundings
     return law.inertia * comes_down * log_kept * window * speed * xp.abs(speed)
 
 
-def sliding_object(pair: str) -> int | None:
-    """Which object's friction a contact pair of scenes/ramp.xml carries; None for the hit."""
-    first, second = pair.split("_")
-    return None if second.startswith("object") else int(first.removeprefix("object")) - 1
+def sliding_objects(compiled: Any) -> tuple[Int[np.ndarray, " sled"], Int[np.ndarray, " sled"]]:
+    """The contact pairs of scenes/ramp.xml that carry an object's friction, and which object's.
+
+    The other pairs are those of hits.
+    """
+    names = [compiled.pair(i).name.split("_") for i in range(compiled.npair)]
+    pairs = [i for i, (_, other) in enumerate(names) if not other.startswith("object")]
+    return np.array(pairs), np.array([int(names[i][0].removeprefix("object")) - 1 for i in pairs])
 
 
 def write_contacts(
@@ -181,13 +185,11 @@ def write_contacts(
 
     `faces`: MuJoCo's direct solref between objects; None leaves them as they are.
     """
-    written = batch.expand("pair_friction")
-    for i in range(compiled.npair):
-        which = sliding_object(compiled.pair(i).name)
-        if which is not None:
-            written[:, i, :2] = friction[:, which, None]
-        elif faces is not None:
-            batch.expand("pair_solref")[:, i] = faces
+    sleds, objects = sliding_objects(compiled)
+    batch.expand("pair_friction")[:, sleds, :2] = friction[:, objects, None]
+    if faces is not None:
+        hits = np.delete(np.arange(compiled.npair), sleds)
+        batch.expand("pair_solref")[:, hits] = faces[:, None]
 
 
 def to_path(
