@@ -48,20 +48,16 @@ class Form(Effect):
     """An effect without a name; `meaning` says what it does, `name` only labels it."""
 
     meaning: ClassVar[str]
+    # The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same
     family: ClassVar[str]
-    """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
-    nature: ClassVar[str] = "friction"
-    """What has that shape: friction, a drag or a push, as in `model.effects.law`."""
-    is_on_all: ClassVar[bool] = True
-    """Else on object 1 alone."""
-    how_likely: ClassVar[float] = UNNAMED_ODDS
-    """Before the data, against an effect with a name."""
-
+    nature: ClassVar[str] = "friction"  # what has that shape, as in `model.effects.law`
+    is_on_all: ClassVar[bool] = True  # else on object 1 alone
+    how_likely: ClassVar[float] = UNNAMED_ODDS  # before the data, against an effect with a name
+    # Which of its constants is known of effects that have a name; empty: there are none
     constant: ClassVar[str] = ""
-    """Which of its constants is known of effects that have a name; empty: there are none."""
     constant_words: ClassVar[str] = ""
+    # The constant's value of each of these effects
     named_values: ClassVar[Mapping[str, float]] = MappingProxyType({})
-    """The constant's value of each of these effects."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """The same for whatever strength and scene."""

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
@@ -102,11 +101,6 @@ class FreeAcceleration(Effect):
     def knots(self, index: int) -> tuple[str, ...]:
         """The names of all of an object's knots; objects are counted from 0."""
         return tuple(n for p in range(len(self.spans_s[index])) for n in _knots(index, p))
-
-    def mixing(self, index: int) -> np.ndarray:
-        """From `z` of an object's knots to their accelerations, m/s^2, `[knot, knot]`."""
-        counts = [len(_knots(index, piece)) for piece in range(len(self.spans_s[index]))]
-        return SD_M_S2 * np.asarray(block_diag(*(mixing(count) for count in counts)))
 
     def knot_values(self, times_s: np.ndarray, wanted: np.ndarray, index: int) -> np.ndarray:
         """The parameters' `z` `[knot, curve]` with which an object comes closest to given curves.
