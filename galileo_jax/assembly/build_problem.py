@@ -45,15 +45,9 @@ def make_problem(
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects.
 
-    Args:
-      clip: what is declared.
-      observation: what was measured.
-      engine: rolls the model out.
-      effects: in the model, besides the scenario's own laws.
-      noise: of the observation; default: `noise_of` the clip.
-      motion: see `Model`.
-      free: names of declared quantities that are inferred ("gravity").
-      trials_differ: whether this is a trial of several, between which friction differs.
+    `effects` are besides the scenario's own laws, `noise` is by default `noise_of` the clip,
+    `motion` as of `Model`, `free` names declared quantities that are inferred ("gravity"), and
+    `trials_differ` says that this is a trial of several, between which friction differs.
 
     Raises:
       InputError: an effect has no place in the scenario, the engine is not for this model, or

@@ -176,16 +176,10 @@ def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, ..
 def _pendulum(
     clip: Clip, times_s: np.ndarray, place_m: np.ndarray, velocity: tuple[float, ...]
 ) -> dict[str, tuple[float, float]]:
-    """The two numbers of each prior, by name.
+    """A pendulum's length, its angle and its speed along the circle at the start.
 
     The period tells the length in metres, whatever the scale; the circle that the path is on the
-    angle, or where it is too short for that its middle.
-
-    Args:
-      clip: what is declared.
-      times_s: `[frame]`, of frames in which the bob is seen.
-      place_m: `[axis, frame]`, as measured.
-      velocity: in the first of them, m/s.
+    angle, or where it is too short for that its middle. `velocity`: in the first frame, m/s.
     """
     x, y = place_m[0], place_m[1]
     length = clip.gravity * (period_s(times_s, x) / (2 * math.pi)) ** 2

@@ -8,6 +8,7 @@ import numpy as np
 
 from galileo_jax.clip.walls import Wall
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.numerics.line_segments import distance_to_segment
 from galileo_jax.observation.observation import Observation
 
@@ -24,10 +25,7 @@ def level_starts(
 ) -> dict[str, tuple[float, float]]:
     """The two numbers of each prior, by the parameter's name; nothing of pucks that rest.
 
-    Args:
-      observation: its first frames are the begin of the motion.
-      radius_m: of the first puck.
-      walls: off which pucks bounce.
+    The motion begins with the observation's first frames; `radius_m` is that of the first puck.
     """
     found = {OFFSET: (0.0, OFFSET_SHARE * radius_m)}
     for i, (place, mask) in enumerate(zip(observation.position_m, observation.mask, strict=True)):
@@ -65,11 +63,10 @@ def _turning(observation: Observation, i: int, walls: Sequence[Wall]) -> tuple[f
     if len(seen) <= 3:
         return None
     after, turned = times[seen] - times[seen[0]], np.unwrap(observation.turned_rad[i, seen])
-    design = np.vander(after, 3)
-    solution = np.linalg.lstsq(design, turned, rcond=None)[0]
-    scatter = np.sum((turned - design @ solution) ** 2) / (len(seen) - 3)
-    variance = max(float(scatter), TURNED_SD_RAD**2) * np.linalg.inv(design.T @ design)[1, 1]
-    speed, (least, share) = float(solution[1]), TURNING_SD
+    fit = polynomial(after, turned, 2)
+    scatter = np.sum(fit.left**2) / (len(seen) - 3)
+    variance = max(float(scatter), TURNED_SD_RAD**2) * fit.inverse[1, 1]
+    speed, (least, share) = float(fit.solution[1]), TURNING_SD
     return speed, math.hypot(math.sqrt(variance), least + share * abs(speed))
 
 
