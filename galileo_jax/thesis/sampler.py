@@ -1,6 +1,5 @@
 """The thesis's estimator: short chains of uniform proposals; the best sample wins."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar, Literal, NamedTuple
 
@@ -109,7 +108,6 @@ class Thesis(AbstractSampler):
 def infer(
     key: jax.Array,
     log_similarity: LogDensity,
-    names: Sequence[str] = SEARCHED,
     *,
     acceptance: Acceptance = "coin",
     num_chains: int = NUM_CHAINS,
@@ -124,8 +122,8 @@ def infer(
         key,
         Thesis(acceptance=acceptance),
         log_similarity,
-        jax.random.uniform(start_key, (num_chains, len(names)), minval=1e-6),
-        names,
+        jax.random.uniform(start_key, (num_chains, len(SEARCHED)), minval=1e-6),
+        SEARCHED,
         settings=Settings(warmup_steps=0, block_steps=25, max_steps=NUM_STEPS, stops_early=False),
     )
 
@@ -182,7 +180,6 @@ def thesis_posterior(
     chains = infer(
         jax.random.key(seed),
         log_similarity,
-        SEARCHED,
         acceptance=acceptance,
         num_chains=num_chains,
     )
