@@ -10,7 +10,7 @@ speed, -v^2 d'(q); the path in the picture is bent alike:
 
     along = integral of cos d dq,    across = -integral of sin d dq
 
-Only where the path is clearly bent (`scene/board_path.py`), which gives the prior.
+Only where the path is clearly bent (`assembly/board_path.py`), which gives the prior.
 """
 
 from typing import Any

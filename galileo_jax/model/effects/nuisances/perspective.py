@@ -6,7 +6,7 @@ The picture grows along a fall by `exp(-p)` at its top to `exp(p)` at its end.
 
 h: the length of the fall; right at both ends, where the scale was set. So a pinhole camera
 sees a vertical line when it is pitched: p is about t h / (L (1 + t^2)) for a camera at a
-distance L, pitched by atan t. Only in high falls (`scene/expected.py`), whose middle is at
+distance L, pitched by atan t. Only in high falls (`assembly/expected.py`), whose middle is at
 nobody's eye height. Past the end, where a wrong model may fall, the scale stays.
 
 Source: Hartley and Zisserman, Multiple View Geometry (2004), section 8.6 (a vertical line
