@@ -119,9 +119,8 @@ class SweepConfig(BaseModel):
 def read_config(config: str | Path | Mapping[str, Any]) -> tuple[str, str, dict[str, Any]]:
     """What a config is called in messages, what its sweep is called, and its keys.
 
-    Args:
-      config: a YAML file, the name of a ready one, its keys, or a folder: each film and table in it
-        is explained alone.
+    It is a YAML file, the name of a ready one, its keys, or a folder: each film and table in it is
+    explained alone.
 
     Raises:
       InputError: unreadable, or a folder without a film and a table, or with a result.
@@ -151,13 +150,10 @@ def _plain(value: Any) -> Any:
 def make_configs(
     name: str, content: Mapping[str, Any], changes: Sequence[str] = (), runs: Sequence[str] = ()
 ) -> tuple[SweepConfig, ...]:
-    """The configs that a config and the command line make together.
+    """The configs that a config, called `name` in messages, and the command line make together.
 
-    Args:
-      name: of the config, for messages.
-      content: its keys.
-      changes: "key=value" each, the key with dots (`common.seed=3`), the value YAML.
-      runs: "key=a,b" each: one config for every combination.
+    `changes`: "key=value" each, the key with dots (`common.seed=3`), the value YAML. `runs`:
+    "key=a,b" each: one config for every combination.
 
     Raises:
       InputError: a key is unknown or its value is wrong.

@@ -16,14 +16,11 @@ VARIANCE_M2_S2 = 0.05  # the thesis does not state its unit
 def similarity(
     name: str, predicted_m_s: ArrayLike, observed_m_s: ArrayLike, mask: ArrayLike
 ) -> jax.Array:
-    """How alike two velocity profiles are, `[]`.
+    """How alike two velocity profiles `[object, 2, frame - 1]` are, `[]`.
 
-    Arguments:
-      name: in `SCORES`.
-      predicted_m_s: `[object, 2, frame - 1]`, m/s.
-      observed_m_s: likewise; anything, NaN too, where masked.
-      mask: `[object, frame - 1]`, True where a velocity was measured (both its frames were). What
-        is masked counts for nothing, in the derivative neither.
+    `name`: in `SCORES`. `mask`: `[object, frame - 1]`, True where a velocity was measured (both its
+    frames were). What is masked may be anything, NaN too, and counts for nothing, in the derivative
+    neither.
     """
     both = jnp.broadcast_to(jnp.asarray(mask)[:, None, :], jnp.shape(predicted_m_s))
     # Masked values are replaced before the arithmetic: a NaN times zero stays a NaN.
