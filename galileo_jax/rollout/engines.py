@@ -3,6 +3,8 @@
 from galileo_jax.model.effects.effect import infers_gravity
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.rollout.engine_particle import EngineParticle
+from galileo_jax.rollout.engine_path import EnginePath
 from galileo_jax.rollout.rollout import Engine
 from galileo_jax.runtime.errors import InputError
 
@@ -20,18 +22,10 @@ def make_engine(name: str, model: Model) -> Engine:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
     if model.motion == "free":
         return _free(name, model)
-    if name == "auto":
-        name = "rigid"
     scene = model.scene.surroundings
     is_particle = scene.is_level or not scene.has_surface
-    if name == "rigid" and is_particle:
-        from galileo_jax.rollout.engine_particle import EngineParticle
-
-        return EngineParticle(model)
-    if name == "rigid":
-        from galileo_jax.rollout.engine_path import EnginePath
-
-        return EnginePath(model)
+    if name in ("auto", "rigid"):
+        return EngineParticle(model) if is_particle else EnginePath(model)
     if is_particle:
         raise InputError(f"engine: {name!r} has no scene without a ramp; rigid or auto expected")
     if any(scene.rolls):
