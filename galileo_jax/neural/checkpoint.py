@@ -14,6 +14,7 @@ import numpy as np
 from flax import nnx
 
 from galileo_jax.neural.config import TrainConfig
+from galileo_jax.neural.task import make_task
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
@@ -90,8 +91,6 @@ def load_network(path: Path) -> tuple[Any, TrainConfig]:
     Raises:
       InputError: missing, or not a network of this version.
     """
-    from galileo_jax.neural.task import make_task
-
     try:
         arrays = _arrays(path)
         config = TrainConfig(**json.loads(str(arrays.pop("config"))))

@@ -3,9 +3,14 @@
 from dataclasses import dataclass, fields
 from typing import Literal
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import SUBSTEPS, Model
+from galileo_jax.model.scene.scene import Scene
+from galileo_jax.rollout import engine_path
 from galileo_jax.rollout.motion import pitch, to_plane
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation import solver as fine
@@ -115,10 +120,6 @@ def _checked(truth: Truth, motion: Motion) -> Motion:
 
 
 def _roll_out_free(truth: Truth, seconds: float) -> Motion:
-    import jax
-
-    from galileo_jax.model.model import SUBSTEPS, Model
-    from galileo_jax.model.scene.scene import Scene
     from galileo_jax.rollout.engine_c_free import EngineCFree
 
     scene = Scene(truth.surroundings, truth.objects, RECORD_S / SUBSTEPS)
@@ -136,11 +137,6 @@ def _roll_out_free(truth: Truth, seconds: float) -> Motion:
 def _roll_out_rigid(
     truth: Truth, scene: Surroundings, seconds: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    import jax
-    import jax.numpy as jnp
-
-    from galileo_jax.rollout import engine_path
-
     names = tuple(truth.theta)
     num_records = round(seconds / RECORD_S) + 1
     with jax.enable_x64(True):
