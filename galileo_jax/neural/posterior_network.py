@@ -48,14 +48,7 @@ class Constant(nnx.Variable):
 
 
 class PosteriorNetwork(nnx.Module):
-    """The conditional density; see the module.
-
-    Attributes:
-      mean, sd: `[feature]`, of the training features.
-      low, high: `[feature]`, the range of the training features and a little more.
-      whitening: `[feature, feature]`, of the standardised training features.
-      usual_distance: hardly a training clip is farther from the others.
-    """
+    """The conditional density; see the module."""
 
     def __init__(
         self,
@@ -79,6 +72,8 @@ class PosteriorNetwork(nnx.Module):
         self.outer = nnx.List(
             [nnx.Linear(64, 3 * NUM_COMPONENTS, rngs=rngs) for _ in range(NUM_TARGETS)]
         )
+        # Of the training features: mean and spread, their range and a little more, and what whitens
+        # them when they are standardised. Hardly a training clip is farther from the others.
         self.mean = Constant(jnp.zeros(num_features))
         self.sd = Constant(jnp.ones(num_features))
         self.low = Constant(jnp.full(num_features, -jnp.inf))
