@@ -67,29 +67,22 @@ def _sides(value: Any) -> tuple[float, float]:
 
 
 class Rectangle(BaseModel):
-    """A rectangle in the plane of the motion.
-
-    Attributes:
-      corners_px: bottom left, bottom right, top right and top left as seen upright, x right, y
-        down; each known within half a pixel.
-      sides_m: width and height.
-    """
+    """A rectangle in the plane of the motion."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    # bottom left, bottom right, top right and top left as seen upright, x right, y down; each known
+    # within half a pixel
     corners_px: Annotated[tuple[Pixel, ...], BeforeValidator(_corners)]
-    sides_m: Annotated[tuple[float, float], BeforeValidator(_sides)]
+    sides_m: Annotated[tuple[float, float], BeforeValidator(_sides)]  # width and height
 
 
 class Lens(BaseModel):
-    """How a lens bends straight lines.
-
-    Attributes:
-      k1: radial distortion, see the module.
-      k1_sd: how well it is known (one standard deviation); 0 = taken at its word.
-    """
+    """How a lens bends straight lines."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    # radial distortion, see the module
     k1: Annotated[Number, refused(dict.fromkeys((f"< {MIN_K1}", f"> {MAX_K1}"), NO_K1))]
+    # how well it is known (one standard deviation); 0 = taken at its word
     k1_sd: Annotated[Number, Field(ge=0, le=0.2)] = 0.0

@@ -18,19 +18,12 @@ SAME = 0.25
 
 @dataclass(frozen=True)
 class DeclaredTrack:
-    """A track file, and what is declared of it.
+    """A track file, and what is declared of it."""
 
-    Attributes:
-      yaml_path: named where a key is missing.
-      path: the track.
-      file: the yaml's keys.
-      fps: declared frames per second; None = not declared.
-    """
-
-    yaml_path: Path
-    path: Path
-    file: ClipFile
-    fps: float | None
+    yaml_path: Path  # named where a key is missing
+    path: Path  # the track
+    file: ClipFile  # the yaml's keys
+    fps: float | None  # declared frames per second; None = not declared
 
     @property
     def scenario(self) -> Scenario:

@@ -36,17 +36,11 @@ REPLACES = {"rectangle": "pixels_per_metre", "pixels_per_metre": "rectangle"}
 
 @dataclass(frozen=True)
 class LabelledClip:
-    """What `label` wrote.
+    """What `label` wrote."""
 
-    Attributes:
-      path: of the yaml.
-      clip: as it is declared now.
-      notes: what to know about the writing, one line each.
-    """
-
-    path: Path
-    clip: Clip
-    notes: tuple[str, ...] = ()
+    path: Path  # of the yaml
+    clip: Clip  # as it is declared now
+    notes: tuple[str, ...] = ()  # what to know about the writing, one line each
 
     def __repr__(self) -> str:
         """In one line."""

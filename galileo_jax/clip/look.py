@@ -39,56 +39,35 @@ GAP = 1.5
 
 @dataclass(frozen=True)
 class Likely:
-    """The likeliest kind of motion of a path.
+    """The likeliest kind of motion of a path."""
 
-    Attributes:
-      scenario: its name.
-      why: what speaks for it, one phrase.
-      is_clear: no other kind of motion looks like it.
-      slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
-      swings: how often it turns back by more than half of its way, as nothing does that slides.
-      bounces: whether it comes back up from something below, which a yaml calls `floor`.
-    """
-
-    scenario: str
-    why: str
-    is_clear: bool = False
+    scenario: str  # its name
+    why: str  # what speaks for it, one phrase
+    is_clear: bool = False  # no other kind of motion looks like it
+    # of a straight path in two coordinates, against the horizontal; None of others
     slope_deg: float | None = None
+    # how often it turns back by more than half of its way, as nothing does that slides
     swings: int = 0
+    # whether it comes back up from something below, which a yaml calls `floor`
     bounces: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seen(Likely):
-    """What was understood of a table, and of object 1 in it.
+    """What was understood of a table, and of object 1 in it."""
 
-    Attributes:
-      path: the file.
-      columns: role, unit and resolution of each.
-      names: of the objects.
-      num_rows: of the table.
-      step: the usual time between rows, s, or in frames where it has no times.
-      is_in_frames: the file counts frames; `fps` makes them seconds.
-      gaps: (row, how many steps long) of the longer ones, from 0.
-      unit: of length; None where the file does not say.
-      axes: that were measured.
-      moved: how far object 1 moves along each axis, in the file's unit.
-      yaml: that would be written beside the file.
-      warnings: doubts, one line each.
-    """
-
-    path: Path
-    columns: tuple[Column, ...]
-    names: tuple[str, ...]
-    num_rows: int
-    step: float
-    is_in_frames: bool
-    gaps: tuple[tuple[int, float], ...]
-    unit: str | None
-    axes: tuple[str, ...]
-    moved: tuple[float, ...]
-    yaml: str
-    warnings: tuple[str, ...] = ()
+    path: Path  # the file
+    columns: tuple[Column, ...]  # role, unit and resolution of each
+    names: tuple[str, ...]  # of the objects
+    num_rows: int  # of the table
+    step: float  # the usual time between rows, s, or in frames where it has no times
+    is_in_frames: bool  # the file counts frames; `fps` makes them seconds
+    gaps: tuple[tuple[int, float], ...]  # (row, how many steps long) of the longer ones, from 0
+    unit: str | None  # of length; None where the file does not say
+    axes: tuple[str, ...]  # that were measured
+    moved: tuple[float, ...]  # how far object 1 moves along each axis, in the file's unit
+    yaml: str  # that would be written beside the file
+    warnings: tuple[str, ...] = ()  # doubts, one line each
 
 
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:

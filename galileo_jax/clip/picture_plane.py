@@ -26,23 +26,15 @@ Points = Float[np.ndarray, "*point 2"]
 
 @dataclass(frozen=True)
 class PicturePlane:
-    """A map between pixels and metres, both ways.
+    """A map between pixels and metres, both ways."""
 
-    Attributes:
-      origin_px: where x and y are 0.
-      sign: 1 where x, along the travel, is to the right in the picture, else -1.
-      scale: pixels per metre, where there is no homography.
-      homography: `[3, 3]`, from pixels without the lens to metres right and up; None: a camera
-        that is square to the plane.
-      k1: of the lens, 0 without one.
-      middle_px, unit_px: the lens's middle, and the unit of its r.
-    """
-
-    origin_px: tuple[float, float]
-    sign: float
-    scale: float
+    origin_px: tuple[float, float]  # where x and y are 0
+    sign: float  # 1 where x, along the travel, is to the right in the picture, else -1
+    scale: float  # pixels per metre, where there is no homography
+    # from pixels without the lens to metres right and up; None: the camera is square to the plane
     homography: Float[np.ndarray, "3 3"] | None = None
-    k1: float = 0.0
+    k1: float = 0.0  # of the lens, 0 without one
+    # the lens's middle, and the unit of its r
     middle_px: tuple[float, float] = (0.0, 0.0)
     unit_px: float = 1.0
 

@@ -49,20 +49,13 @@ MIN_SIZE_PX = 2.0
 
 @dataclass(frozen=True)
 class Outline:
-    """An object seen from the side: a box, or a disc that surely fits into it.
+    """An object seen from the side: a box, or a disc that surely fits into it."""
 
-    Attributes:
-      name: the object's.
-      centre_m: `[2]`, x along the travel, y up.
-      half_sides_m: (along, across) for a box; None for a disc.
-      angle_rad: of the box against the table, positive where it points downhill.
-      height_m: (smallest, largest) height it can have, resting in any of its ways.
-    """
-
-    name: str
-    centre_m: np.ndarray
-    half_sides_m: tuple[float, float] | None
-    angle_rad: float
+    name: str  # the object's
+    centre_m: np.ndarray  # `[2]`, x along the travel, y up
+    half_sides_m: tuple[float, float] | None  # (along, across) for a box; None for a disc
+    angle_rad: float  # of the box against the table, positive where it points downhill
+    # (smallest, largest) height it can have, resting in any of its ways
     height_m: tuple[float, float]
 
     def axes(self) -> list[np.ndarray]:

@@ -18,37 +18,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SourceFiles:
-    """What a clip consists of.
+    """What a clip consists of."""
 
-    Attributes:
-      name: that it goes by.
-      root: a folder above all its files.
-      paths: its files, as far as they are there.
-      declared: what is declared about it, as text that is the same only if that is.
-    """
-
-    name: str
-    root: Path
-    paths: tuple[Path, ...]
-    declared: str
+    name: str  # that it goes by
+    root: Path  # a folder above all its files
+    paths: tuple[Path, ...]  # its files, as far as they are there
+    declared: str  # what is declared about it, as text that is the same only if that is
 
 
 @dataclass(frozen=True)
 class ClipSource:
-    """A data set; what its functions refuse is an `InputError`, one line.
+    """A data set; what its functions refuse is an `InputError`, one line."""
 
-    Attributes:
-      name: in the registry.
-      recognises: whether a video, which has no yaml beside it, belongs to it.
-      load: the checked clip of a video; values that are given win over what is declared.
-      label: writes what a user says about a video where the data set keeps it, or nothing.
-      files: the files of a video's clip; what is wrong with them is for `load` to say.
-    """
-
-    name: str
+    name: str  # in the registry
+    # whether a video, which has no yaml beside it, belongs to it
     recognises: Callable[[Path], bool]
+    # the checked clip of a video; values that are given win over what is declared
     load: Callable[[Path, dict[str, Any]], "Clip"]
+    # writes what a user says about a video where the data set keeps it, or nothing
     label: Callable[[Path, "Declaration"], "LabelledClip"]
+    # the files of a video's clip; what is wrong with them is for `load` to say
     files: Callable[[Path], SourceFiles]
 
 

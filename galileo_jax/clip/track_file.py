@@ -58,25 +58,16 @@ OWN_CSV_SAYS = {
 
 @dataclass(frozen=True)
 class FileTrack:
-    """What was read.
+    """What was read."""
 
-    Attributes:
-      observation: in metres, axes as `Observation` has them.
-      unit: of the file: "m", "cm", ..., or "px".
-      is_own: our own csv, whose titles and axes are fixed.
-      fps: frames per second.
-      pixels_per_metre: of a file in pixels; None = unknown (lengths are in nominal metres).
-      origin_px: of a file in pixels; None = unknown.
-      warnings: doubts, one line each.
-    """
-
-    observation: Observation
-    unit: str
-    fps: float
-    is_own: bool = False
+    observation: Observation  # in metres, axes as `Observation` has them
+    unit: str  # of the file: "m", "cm", ..., or "px"
+    fps: float  # frames per second
+    is_own: bool = False  # our own csv, whose titles and axes are fixed
+    # of a file in pixels; None = unknown (lengths are in nominal metres)
     pixels_per_metre: float | None = None
-    origin_px: tuple[float, float] | None = None
-    warnings: tuple[str, ...] = ()
+    origin_px: tuple[float, float] | None = None  # of a file in pixels; None = unknown
+    warnings: tuple[str, ...] = ()  # doubts, one line each
 
 
 def is_track(path: Path) -> bool:

@@ -21,17 +21,14 @@ PAIRS = (("from_m", "to_m"), ("from_px", "to_px"))
 
 
 class Wall(BaseModel):
-    """One straight wall.
-
-    Attributes:
-      from_m, to_m: its ends from the origin, m.
-      from_px, to_px: its ends in the picture, in place of these.
-    """
+    """One straight wall."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    # its ends from the origin, m
     from_m: Point | None = None
     to_m: Point | None = None
+    # its ends in the picture, in place of these
     from_px: Point | None = None
     to_px: Point | None = None
 

@@ -45,34 +45,24 @@ LEAST_FRAMES, LEAST_SHARE = 8, 0.5  # of a clip, that tell whether a model descr
 
 @dataclass(frozen=True)
 class Measurement:
-    """A clip and where its objects were seen.
+    """A clip and where its objects were seen."""
 
-    Attributes:
-      clip: with what was inferred filled in.
-      observation: in metres, of what is motion of the scene.
-      whole: in metres, to the clip's end.
-      pixels: the track in pixels; None where the clip is a track already.
-      inferred: key of the clip that was left null to value and sd.
-      segments: which part of the track that is, and why.
-      doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
-      remarks: what was inferred or left out, one line each.
-      way: of object 1, where its path says another than is declared.
-      frames_used, frames: in how many an object is seen and used, and how many the clip has.
-      frames_of_scene: of these, how many no cut leaves out, from the first that is declared on,
-        until all objects have left the picture.
-    """
-
-    clip: Clip
-    observation: Observation
-    whole: Observation
-    pixels: Track | None = None
+    clip: Clip  # with what was inferred filled in
+    observation: Observation  # in metres, of what is motion of the scene
+    whole: Observation  # in metres, to the clip's end
+    pixels: Track | None = None  # the track in pixels; None where the clip is a track already
+    # key of the clip that was left null to value and sd
     inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    segments: Segments = field(default_factory=Segments)
+    segments: Segments = field(default_factory=Segments)  # which part of the track that is, and why
+    # of what is declared and of tracks gone astray, one line each; results repeat them
     doubts: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    way: OtherWay | None = None
+    remarks: tuple[str, ...] = ()  # what was inferred or left out, one line each
+    way: OtherWay | None = None  # of object 1, where its path says another than is declared
+    # in how many an object is seen and used, and how many the clip has
     frames_used: int = 0
     frames: int = 0
+    # of these, how many no cut leaves out, from the first that is declared on, until all objects
+    # have left the picture
     frames_of_scene: int = 0
 
     @property

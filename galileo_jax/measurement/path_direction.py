@@ -29,18 +29,13 @@ MOST_SD_DEG = 1.0
 
 @dataclass(frozen=True)
 class OtherWay:
-    """A path that does not go where it is declared to go.
+    """A path that does not go where it is declared to go."""
 
-    Attributes:
-      declared_deg: below the horizontal, along the travel.
-      path_deg, sd_deg: the path's, as it was measured.
-      is_turned_back: whether the way along the path is taken for the declared way.
-    """
-
-    declared_deg: float
+    declared_deg: float  # below the horizontal, along the travel
+    # the path's, as it was measured
     path_deg: float
     sd_deg: float
-    is_turned_back: bool
+    is_turned_back: bool  # whether the way along the path is taken for the declared way
 
 
 def other_way(clip: Clip, observation: Observation) -> OtherWay | None:

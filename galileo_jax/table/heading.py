@@ -29,21 +29,13 @@ MARKERS = "marker_names"
 
 @dataclass(frozen=True)
 class Heading:
-    """The part above the numbers, and the numbers.
+    """The part above the numbers, and the numbers."""
 
-    Attributes:
-      titles: one for each column, as the file has it; "" where it has none.
-      meanings: the titles taken apart, with units and names from other rows.
-      body: the rows of numbers.
-      is_titled: whether a title was understood.
-      frame_s: between two rows, s, where the heading tells it.
-    """
-
-    titles: tuple[str, ...]
-    meanings: tuple[Title, ...]
-    body: Rows
-    is_titled: bool
-    frame_s: float | None = None
+    titles: tuple[str, ...]  # one for each column, as the file has it; "" where it has none
+    meanings: tuple[Title, ...]  # the titles taken apart, with units and names from other rows
+    body: Rows  # the rows of numbers
+    is_titled: bool  # whether a title was understood
+    frame_s: float | None = None  # between two rows, s, where the heading tells it
 
     def name_of(self, n: int) -> str:
         """What messages call a column; no two are the same."""

@@ -36,15 +36,10 @@ SPACES = dict.fromkeys(map(ord, "\u00a0\u2009\u202f"), " ") | {0x2212: "-", 0x20
 
 @dataclass(frozen=True)
 class Numbers:
-    """A column of numbers.
+    """A column of numbers."""
 
-    Attributes:
-      values: `[row]`, NaN where there is none.
-      resolution: unit in the last place as printed, median over the rows; NaN where there is no
-        number but 0.
-    """
-
-    values: np.ndarray
+    values: np.ndarray  # `[row]`, NaN where there is none
+    # unit in the last place as printed, median over the rows; NaN where there is no number but 0
     resolution: float
 
     @property

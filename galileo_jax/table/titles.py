@@ -38,17 +38,11 @@ NUMBERED = re.compile(r"([xyz]|t(?=[_ ]?\d))[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Title:
-    """A column's title, taken apart.
+    """A column's title, taken apart."""
 
-    Attributes:
-      role: what the column is.
-      name: of the object, "" where the title has none.
-      unit: as written, lower case; None where none is.
-    """
-
-    role: Role
-    name: str = ""
-    unit: str | None = None
+    role: Role  # what the column is
+    name: str = ""  # of the object, "" where the title has none
+    unit: str | None = None  # as written, lower case; None where none is
 
 
 def count_words(text: str) -> int:

@@ -22,77 +22,50 @@ MIN_LIKELIHOOD = 0.6
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a tool knows of its picture.
+    """What a tool knows of its picture."""
 
-    Attributes:
-      pixels_per_unit: along (x, y).
-      unit: of length; None where the file does not name it.
-      origin_px: x right, y down.
-      roll_rad: how its level x axis is turned against the picture's, counterclockwise.
-    """
-
-    pixels_per_unit: tuple[float, float]
-    unit: str | None
-    origin_px: tuple[float, float]
-    roll_rad: float = 0.0
+    pixels_per_unit: tuple[float, float]  # along (x, y)
+    unit: str | None  # of length; None where the file does not name it
+    origin_px: tuple[float, float]  # x right, y down
+    roll_rad: float = 0.0  # how its level x axis is turned against the picture's, counterclockwise
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column, as it was understood.
+    """A column, as it was understood."""
 
-    Attributes:
-      title: as the file has it; "column 3" where it has none.
-      role: "time", "frame", "x", ...; "" where it is not used.
-      name: of the object.
-      unit: as the file has it; None where it has none.
-      resolution: unit in the last place that is printed, in the column's unit; NaN where it is
-        not used.
-    """
-
-    title: str
-    role: str
-    name: str = ""
-    unit: str | None = None
+    title: str  # as the file has it; "column 3" where it has none
+    role: str  # "time", "frame", "x", ...; "" where it is not used
+    name: str = ""  # of the object
+    unit: str | None = None  # as the file has it; None where it has none
+    # unit in the last place that is printed, in the column's unit; NaN where it is not used
     resolution: float = math.nan
 
 
 @dataclass(frozen=True)
 class TrackTable:
-    """A motion in a table.
+    """A motion in a table."""
 
-    Attributes:
-      names: of the objects, as the file calls them.
-      position: `[object, axis, row]` in `unit`, x right; NaN where an object was not seen.
-      axes: what was measured, of "x", "y", "z", "line" (along the way) and "angle" (rad).
-      clock: `[row]`, s, or whole numbers of frames.
-      is_in_frames: the file gives frames, not times.
-      is_counted: the file has neither: each row is a frame.
-      frame_s: between two frames, s; None where the file does not tell.
-      unit: a key of `METRES_PER_UNIT`, or "px"; None where the file does not tell.
-      resolution: `[axis]`, unit in the last place of positions as printed, in `unit`; empty where
-        nothing was rounded.
-      y_axis: "up" or "down"; None where the file does not tell.
-      calibration: of a file in pixels; None where it has none.
-      starts: rows at which a motion begins: the first, and those in which the clock begins anew.
-      columns: of a table, all that it has, in their order.
-      warnings: doubts, one line each.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the objects, as the file calls them
+    # `[object, axis, row]` in `unit`, x right; NaN where an object was not seen
     position: np.ndarray
-    clock: np.ndarray
-    is_in_frames: bool = True
+    clock: np.ndarray  # `[row]`, s, or whole numbers of frames
+    is_in_frames: bool = True  # the file gives frames, not times
+    # what was measured, of "x", "y", "z", "line" (along the way) and "angle" (rad)
     axes: tuple[str, ...] = ("x", "y")
-    is_counted: bool = False
-    frame_s: float | None = None
+    is_counted: bool = False  # the file has neither: each row is a frame
+    frame_s: float | None = None  # between two frames, s; None where the file does not tell
+    # a key of `METRES_PER_UNIT`, or "px"; None where the file does not tell
     unit: str | None = None
+    # `[axis]`, unit in the last place of positions as printed, in `unit`; empty where nothing was
+    # rounded
     resolution: tuple[float, ...] = ()
-    y_axis: Literal["up", "down"] | None = None
-    calibration: Calibration | None = None
+    y_axis: Literal["up", "down"] | None = None  # None where the file does not tell
+    calibration: Calibration | None = None  # of a file in pixels; None where it has none
+    # rows at which a motion begins: the first, and those in which the clock begins anew
     starts: tuple[int, ...] = (0,)
-    columns: tuple[Column, ...] = ()
-    warnings: tuple[str, ...] = ()
+    columns: tuple[Column, ...] = ()  # of a table, all that it has, in their order
+    warnings: tuple[str, ...] = ()  # doubts, one line each
 
     def frame_s_by(self, fps: float | None) -> float:
         """Between two frames, s: as declared, or as the file tells; NaN where neither does."""

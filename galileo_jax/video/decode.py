@@ -29,21 +29,13 @@ FIELDS = "bwdif=mode=send_field:parity={}"  # of each interlaced picture two
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What decoding a whole film showed.
+    """What decoding a whole film showed."""
 
-    Attributes:
-      size_px: (width, height), of square pixels, upright.
-      fps: the declared rate, or the film's where none was declared.
-      container_fps: the film's own.
-      times_s: when each picture that is looked at was taken, from the first on.
-      warnings: doubts, one line each.
-    """
-
-    size_px: tuple[int, int]
-    fps: float
-    container_fps: float
-    times_s: tuple[float, ...]
-    warnings: tuple[str, ...] = ()
+    size_px: tuple[int, int]  # (width, height), of square pixels, upright
+    fps: float  # the declared rate, or the film's where none was declared
+    container_fps: float  # the film's own
+    times_s: tuple[float, ...]  # when each picture that is looked at was taken, from the first on
+    warnings: tuple[str, ...] = ()  # doubts, one line each
 
     @property
     def frame_count(self) -> int:

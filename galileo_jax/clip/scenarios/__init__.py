@@ -8,41 +8,28 @@ from galileo_jax.runtime.registry import Registry
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a scenario asks of its clip, and what its model begins with.
+    """What a scenario asks of its clip, and what its model begins with."""
 
-    Attributes:
-      name: as written in the clip yaml.
-      meaning: one phrase for the user.
-      has_ramp: its objects slide on a ramp or the table; it needs `ramp_angle_deg`, unless there is
-        an `angle_deg`.
-      angle_deg: of the surface, where that is no choice.
-      has_table: the ramp ends on a table.
-      num_objects: (fewest, most) objects; None means no upper limit.
-      is_level: objects slide on a level table that is seen from above.
-      moves_in_plane: the path bends freely; False: it is straight, or a ramp and a table.
-      line: the straight line that the motion is along, or is told by, for which one coordinate is
-        enough: "down", "slope", "level" or "aside"; None: it needs two.
-      up_shows: what of a path tells which way is up: "bend" (it falls), "sag" (it hangs) or
-        "drop" (it ends lower); None: nothing.
-      laws: names of the laws of motion that are always there (`effects/laws/`).
-      without: effects that have no place, because the laws do the same or the picture cannot
-        tell them from these.
-      keys: optional keys of the clip yaml that mean something here alone.
-    """
-
-    name: str
-    meaning: str
+    name: str  # as written in the clip yaml
+    meaning: str  # one phrase for the user
+    # its objects slide on a ramp or the table; it needs `ramp_angle_deg`, or has an `angle_deg`
     has_ramp: bool
-    angle_deg: float | None = None
+    angle_deg: float | None = None  # of the surface, where that is no choice
+    # (fewest, most) objects; None means no upper limit
     num_objects: tuple[int, int | None] = (1, 1)
-    has_table: bool = False
-    is_level: bool = False
+    has_table: bool = False  # the ramp ends on a table
+    is_level: bool = False  # objects slide on a level table that is seen from above
+    # the path bends freely; False: it is straight, or a ramp and a table
     moves_in_plane: bool = False
+    # the line that the motion is along, or is told by, where one coordinate is enough
     line: Literal["down", "slope", "level", "aside"] | None = None
+    # what of a path tells which way is up: it falls, it hangs, it ends lower
     up_shows: Literal["bend", "sag", "drop"] | None = None
+    # names of the laws of motion that are always there (`effects/laws/`)
     laws: tuple[str, ...] = ()
+    # effects that have no place: the laws do the same, or the picture cannot tell them from these
     without: tuple[str, ...] = ()
-    keys: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()  # optional keys of the clip yaml that mean something here alone
 
     @property
     def has_surface(self) -> bool:

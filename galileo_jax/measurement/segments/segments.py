@@ -59,19 +59,12 @@ EXPOSED_FRAMES = 1
 
 @dataclass(frozen=True)
 class Cut:
-    """Where the part of a track that is used begins or ends.
+    """Where the part of a track that is used begins or ends."""
 
-    Attributes:
-      name: the object's.
-      time_s: of the first frame that is used, or of the last.
-      side: which part is left out.
-      why: a phrase with the object as its subject.
-    """
-
-    name: str
-    time_s: float
-    side: str  # "before" or "after"
-    why: str
+    name: str  # the object's
+    time_s: float  # of the first frame that is used, or of the last
+    side: str  # which part is left out: "before" or "after"
+    why: str  # a phrase with the object as its subject
 
     def __str__(self) -> str:
         """One line, without the clip's name."""
@@ -80,15 +73,10 @@ class Cut:
 
 @dataclass(frozen=True)
 class Segments:
-    """Where a track is motion of its scene.
+    """Where a track is motion of its scene."""
 
-    Attributes:
-      cuts: where it begins and ends, in time's order.
-      astray: objects whose tracks are not to be believed to their ends.
-    """
-
-    cuts: tuple[Cut, ...] = ()
-    astray: tuple[Astray, ...] = ()
+    cuts: tuple[Cut, ...] = ()  # where it begins and ends, in time's order
+    astray: tuple[Astray, ...] = ()  # objects whose tracks are not to be believed to their ends
 
     def within(self, times_s: np.ndarray) -> Bool[np.ndarray, " frame"]:
         """Which frames no cut leaves out."""
