@@ -6,7 +6,6 @@ Only contradictions larger than such errors are refused.
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.sizes import half_sides
 
 MIN_TOLERANCE_M = 0.005
 """Nobody clicks a centre better than this on a blurred or textured object."""
@@ -51,24 +51,22 @@ MIN_SIZE_PX = 2.0
 class Outline:
     """An object seen from the side: a box, or a disc that surely fits into it."""
 
-    name: str  # the object's
     centre_m: np.ndarray  # `[2]`, x along the travel, y up
-    half_sides_m: tuple[float, float] | None  # (along, across) for a box; None for a disc
+    half_sides_m: tuple[float, float]  # half its length and half its height
+    is_box: bool
     angle_rad: float  # of the box against the table, positive where it points downhill
-    # (smallest, largest) height it can have, resting in any of its ways
-    height_m: tuple[float, float]
 
     def axes(self) -> list[np.ndarray]:
-        """The directions of its sides."""
-        if self.half_sides_m is None:
+        """The directions of a box's sides."""
+        if not self.is_box:
             return []
         c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
         return [np.array([c, -s]), np.array([s, c])]
 
     def half_width(self, direction: np.ndarray) -> float:
         """Half its extent along a unit vector, m."""
-        if self.half_sides_m is None:
-            return self.height_m[0] / 2
+        if not self.is_box:
+            return min(self.half_sides_m)
         sides = zip(self.half_sides_m, self.axes(), strict=True)
         return sum(half * abs(float(axis @ direction)) for half, axis in sides)
 
@@ -113,18 +111,19 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         for index, item in enumerate(clip.objects)
         if item.size_m is not None and item.name in centres_m
     ]
-    for index, _, outline in placed if is_on_ramp else ():
+    for index, item, outline in placed if is_on_ramp else ():
         problem = _against_surfaces(outline, angle, scenario.has_table, pixel_m)
         if problem:
-            return f"objects[{index}] ({outline.name})", f"{problem}; {mend}"
+            return f"objects[{index}] ({item.name})", f"{problem}; {mend}"
     for (_, first, a), (index, second, b) in itertools.combinations(placed, 2):
         if first.first_frame != second.first_frame:
             continue
         depth_m = _penetration_m(a, b)
         if depth_m > _tolerance_m(a, pixel_m) + _tolerance_m(b, pixel_m):
+            deep = f"by about {1000 * depth_m:.0f} mm at the start"
             return (
-                f"objects[{index}] ({b.name})",
-                f"reaches into {a.name} by about {1000 * depth_m:.0f} mm at the start; {mend_pair}",
+                f"objects[{index}] ({second.name})",
+                f"reaches into {first.name} {deep}; {mend_pair}",
             )
     return None
 
@@ -136,7 +135,7 @@ def find_odd_size(clip: Clip) -> tuple[str, str] | None:
     for index, item in enumerate(clip.objects):
         if item.size_m is None:
             continue
-        size_px = max(_seen_sides(item)) * clip.pixels_per_metre
+        size_px = 2 * max(half_sides(item.shape, item.size_m)) * clip.pixels_per_metre
         if not MIN_SIZE_PX <= size_px <= max(clip.frame_size_px):
             width, height = clip.frame_size_px
             return (
@@ -148,34 +147,14 @@ def find_odd_size(clip: Clip) -> tuple[str, str] | None:
     return None
 
 
-def _seen_sides(item: ClipObject) -> Sequence[float]:
-    assert item.size_m is not None
-    match item.shape:
-        case "box":
-            return (item.size_m[0], item.size_m[2])
-        case "sphere":
-            return (2 * item.size_m[0],)
-        case "cylinder":
-            return (2 * item.size_m[0], item.size_m[1])
-        case "torus":
-            return (2 * (item.size_m[0] + item.size_m[1]), 2 * item.size_m[1])
-
-
 def _outline(item: ClipObject, centre_m: np.ndarray, ramp_angle_rad: float) -> Outline:
-    sides = _seen_sides(item)
-    is_box = item.shape == "box"
-    return Outline(
-        name=item.name,
-        centre_m=centre_m,
-        half_sides_m=(sides[0] / 2, sides[1] / 2) if is_box else None,
-        angle_rad=ramp_angle_rad if centre_m[0] < 0 else 0.0,
-        height_m=(sides[1], sides[1]) if is_box else (min(sides), max(sides)),
-    )
+    assert item.size_m is not None
+    angle = ramp_angle_rad if centre_m[0] < 0 else 0.0
+    return Outline(centre_m, half_sides(item.shape, item.size_m), item.shape == "box", angle)
 
 
 def _tolerance_m(outline: Outline, pixel_m: float) -> float:
-    sides_m = [2 * half for half in outline.half_sides_m or ()] or outline.height_m
-    by_size = TOLERANCE_PER_SIZE * min(sides_m)
+    by_size = TOLERANCE_PER_SIZE * 2 * min(outline.half_sides_m)
     return max(MIN_TOLERANCE_M, TOLERANCE_PX * pixel_m, by_size)
 
 
@@ -187,12 +166,13 @@ def _against_surfaces(
     surface = "table" if has_table and y < above_ramp else "ramp"
     clearance = min(above_ramp, y) if has_table else above_ramp
     tolerance = _tolerance_m(outline, pixel_m) + TOLERANCE_PER_DISTANCE * math.hypot(x, y)
-    smallest, largest = outline.height_m
-    if clearance < smallest / 2 - tolerance:
-        depth_mm = 1000 * (smallest / 2 - clearance)
+    # A disc may rest in any of its ways.
+    heights = outline.half_sides_m[1:] if outline.is_box else outline.half_sides_m
+    if clearance < min(heights) - tolerance:
+        depth_mm = 1000 * (min(heights) - clearance)
         return f"stands {depth_mm:.0f} mm inside the {surface} at the start"
-    if clearance > largest + tolerance:
-        gap_mm = 1000 * (clearance - largest / 2)
+    if clearance > 2 * max(heights) + tolerance:
+        gap_mm = 1000 * (clearance - max(heights))
         return f"hangs {gap_mm:.0f} mm above the {surface} at the start"
     return None
 

@@ -11,26 +11,28 @@ UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
 
 
+def half_sides(shape: str, size_m: Sequence[float]) -> tuple[float, float]:
+    """Half the length and half the height of a shape, m: a cylinder stands, a torus lies flat."""
+    match shape:
+        case "box":
+            return size_m[0] / 2, size_m[2] / 2
+        case "cylinder":
+            return size_m[0], size_m[1] / 2
+        case "torus":
+            return size_m[0] + size_m[1], size_m[1]
+        case _:
+            return size_m[0], size_m[0]
+
+
 def extents(declared: ClipObject) -> tuple[float, float]:
     """Half the length along the travel and half the height of an object, m.
 
-    A cylinder stands upright, a torus lies flat, and they slide on their base; where they roll,
-    the cylinder lies across the travel and the torus stands on edge.
+    What slides does so as in `half_sides`; where they roll, a cylinder lies across the travel and a
+    torus stands on edge.
     """
     unknown = UNKNOWN_BOX_M if declared.shape == "box" else UNKNOWN_ROUND_M
-    size = declared.size_m or unknown
-    if declared.roll_inertia is not None:
-        radius = size[0] + (size[1] if declared.shape == "torus" else 0.0)
-        return radius, radius
-    match declared.shape:
-        case "box":
-            return size[0] / 2, size[2] / 2
-        case "cylinder":
-            return size[0], size[1] / 2
-        case "torus":
-            return size[0] + size[1], size[1]
-        case _:
-            return size[0], size[0]
+    length, height = half_sides(declared.shape, declared.size_m or unknown)
+    return length, height if declared.roll_inertia is None else length
 
 
 def rolling(objects: Sequence[ClipObject]) -> dict[str, Any]:

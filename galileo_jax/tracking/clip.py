@@ -9,6 +9,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.sizes import half_sides
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.contrast import in_contrast
@@ -164,18 +165,13 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
     scale = clip.pixels_per_metre
     if item.size_m is None or scale is None:
         return Outline(None, angle, is_round=item.shape != "box")
-    radius, *others = item.size_m
-    match item.shape:
-        case "box":
-            return Outline((radius * scale, others[-1] * scale), angle)
-        case "cylinder" if not (SCENARIOS[clip.scenario].is_level or item.rolls):
-            side = min(2 * radius, others[0])
-        case "torus":
-            side = 2 * (sum(item.size_m) if item.rolls else others[0])
-        case _:  # a sphere, a puck, which lies flat and is seen from above, or what rolls
-            side = 2 * radius
-    # Another cylinder or torus may lie or stand: the disc that fits into it either way.
-    return Outline((side * scale, side * scale), angle, is_round=True)
+    length, height = (2 * half * scale for half in half_sides(item.shape, item.size_m))
+    if item.shape == "box":
+        return Outline((length, height), angle)
+    # A puck, which lies flat and is seen from above, and what rolls show their length; another
+    # cylinder or torus may lie or stand: the disc that fits into it either way.
+    side = length if SCENARIOS[clip.scenario].is_level or item.rolls else min(length, height)
+    return Outline((side, side), angle, is_round=True)
 
 
 def _image_angle_rad(clip: Clip, item: ClipObject) -> float:
