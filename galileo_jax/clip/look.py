@@ -123,9 +123,9 @@ def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely
 
 def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
     """The likeliest scenario of one coordinate in time."""
-    if (turns := _turns(way)) >= SWINGS:
+    if (turns := len(_turning(way))) >= SWINGS:
         why = f"one coordinate, which turns back {turns} times"
-        return Likely("spring", why, swings=_turns(way, HALF))
+        return Likely("spring", why, swings=len(_turning(way, HALF)))
     size = _acceleration(seconds, way) * metres_per_unit
     if math.isfinite(size) and FALL_M_S2[0] < abs(size) < FALL_M_S2[1]:
         why = f"one coordinate, {short(round(abs(size), 2))} m/s^2"
@@ -137,18 +137,19 @@ def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) 
 def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     """The likeliest scenario of one object's path in a plane, in any unit and without a clock."""
     along = x if np.ptp(x) >= np.ptp(y) else y
-    turns = _turns(along)
+    turns = len(_turning(along))
     straight, degrees = _straight(x, y)
     if straight and degrees > 90 - LEVEL_DEG and _bounces(along):
         why = "a straight way up and down, thrown back below"
         return Likely("fall", why, is_clear=True, slope_deg=degrees, bounces=True)
     if turns >= SWINGS:
         kind = "spring" if straight else "pendulum"
-        return Likely(kind, f"turns back {turns} times", swings=_turns(along, HALF))
+        return Likely(kind, f"turns back {turns} times", swings=len(_turning(along, HALF)))
     if not straight:
         if (ramp := _ramp(x, y)) is not None:
             return ramp
-        return Likely("flight", "a path that bends", is_clear=_bends_once(x, y))
+        is_thrown = np.ptp(_beside_parabola(x, y)) <= STRAIGHT * np.hypot(np.ptp(x), np.ptp(y))
+        return Likely("flight", "a path that bends", is_clear=bool(is_thrown))
     if degrees > 90 - LEVEL_DEG:
         return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
     why = f"a straight way at {degrees:.2f} degrees"
@@ -167,14 +168,13 @@ def _ramp(x: np.ndarray, y: np.ndarray) -> Likely | None:
     x, y = x[some], y[some]
     points, size = np.stack([x, y]), float(np.hypot(np.ptp(x), np.ptp(y)))
     found = two_lines(points, FEWEST_ON_A_LINE)
-    if found is None or np.ptp(x) == 0:
+    if found is None:
         return None
     *lines, at = found
     parts = np.split(points, [at], axis=1)
     each = zip(lines, parts, strict=True)
     left = np.concatenate([one.across @ (part - one.middle[:, None]) for one, part in each])
-    thrown = polynomial(x - x.mean(), y, 2).left
-    if np.ptp(left) > STRAIGHT * size or np.sum(left**2) > np.sum(thrown**2):
+    if np.ptp(left) > STRAIGHT * size or np.sum(left**2) > np.sum(_beside_parabola(x, y) ** 2):
         return None
     slope, level = (_straight(*part)[1] for part in parts)
     if not 2 * level < slope < STEEP_DEG:
@@ -183,17 +183,9 @@ def _ramp(x: np.ndarray, y: np.ndarray) -> Likely | None:
     return Likely("ramp", why, is_clear=True)
 
 
-def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
-    """Whether a path is a parabola over x, as of what is thrown, and no ramp with a table."""
-    if np.ptp(x) == 0:
-        return False
-    left = polynomial(x - x.mean(), y, 2).left
-    return bool(np.ptp(left) <= STRAIGHT * np.hypot(np.ptp(x), np.ptp(y)))
-
-
-def _turns(values: np.ndarray, share: float = 0.1) -> int:
-    """How often a coordinate turns back, by more than a share of its range."""
-    return len(_turning(values, share))
+def _beside_parabola(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """How far a path is above the parabola over x, as of what is thrown, that fits it best."""
+    return polynomial(x - x.mean(), y, 2).left
 
 
 def _turning(values: np.ndarray, share: float = 0.1) -> list[int]:
