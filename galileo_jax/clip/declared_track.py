@@ -12,8 +12,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import read_table
 from galileo_jax.table.track_table import TrackTable
 
-SAME = 0.25
-"""Of a step: times of two files that are nearer than this are one."""
+SAME = 0.25  # of a step: times of two files that are nearer than this are one
 
 
 @dataclass(frozen=True)

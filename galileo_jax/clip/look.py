@@ -11,30 +11,21 @@ from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.numerics.least_squares import line_through, polynomial, two_lines
 from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
-STRAIGHT = 0.03
-"""Of a path's length: what stays within this of a line is straight."""
-
+STRAIGHT = 0.03  # of a path's length: what stays within this of a line is straight
 LEVEL_DEG, STEEP_DEG = 2.0, 60.0
 """Between these a straight way is a slope; a steeper one may be a table seen from above."""
 
-SWINGS = 3
-"""Turns back of a motion that swings."""
-
+SWINGS = 3  # turns back of a motion that swings
 FEWEST_ON_A_LINE, ENOUGH_PLACES = 4, 200
 """Places that tell how straight a piece of a path is; of a whole path more are not looked at."""
 
-HALF = 0.5
-"""Of its range: what bounces at the end of its way comes back by less each time."""
-
+HALF = 0.5  # of its range: what bounces at the end of its way comes back by less each time
 PER_TURN, STILL, SAME_SIGN = 8, 0.1, 0.7
 """Places between two turns that show how they are bent; bends smaller by so much are none; which
 share of them has the same sign where something bounces: half do where it swings."""
 
-FALL_M_S2 = (7.0, 12.0)
-"""What a fall accelerates with, air and a camera that is not level in it."""
-
-GAP = 1.5
-"""Of the usual step."""
+FALL_M_S2 = (7.0, 12.0)  # what a fall accelerates with, air and a camera that is not level in it
+GAP = 1.5  # of the usual step
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,8 @@ import numpy as np
 
 from galileo_jax.clip.track_noise import position_noise_m
 
-WITHIN = 0.25
-"""Of a whole number of frames: rougher jumps are something else."""
-
-SURE_SDS = 6.0
-"""By so many standard deviations a step is longer than expected."""
-
+WITHIN = 0.25  # of a whole number of frames: rougher jumps are something else
+SURE_SDS = 6.0  # by so many standard deviations a step is longer than expected
 MOST_LOST, MOST_UNSEEN, LEAST_ROWS = 5, 3, 12
 NEIGHBOURS = 2
 """Steps on either side of a jump, which must be there, and nearer to each other than their size."""

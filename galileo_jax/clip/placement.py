@@ -15,15 +15,9 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.sizes import half_sides
 
-MIN_TOLERANCE_M = 0.005
-"""Nobody clicks a centre better than this on a blurred or textured object."""
-
-TOLERANCE_PX = 4.0
-"""How far a clicked point is easily off."""
-
-TOLERANCE_PER_SIZE = 0.125
-"""A point meant as the centre lies in the middle quarter of the object."""
-
+MIN_TOLERANCE_M = 0.005  # nobody clicks a centre better than this on a blurred or textured object
+TOLERANCE_PX = 4.0  # how far a clicked point is easily off
+TOLERANCE_PER_SIZE = 0.125  # a point meant as the centre lies in the middle quarter of the object
 TOLERANCE_PER_DISTANCE = 0.06
 """Error of height per metre from the foot: a declared angle that is off by 3.4 degrees."""
 

@@ -25,9 +25,7 @@ MOST_SHARE = 0.6
 ASKEW_DEG = 45.0
 """No camera is held so: what falls further from down than this falls along another axis."""
 
-MOST_SCATTER = 0.3
-"""Of gravity: what scatters more from window to window is no fall."""
-
+MOST_SCATTER = 0.3  # of gravity: what scatters more from window to window is no fall
 MOST_OUT_OF_PLANE = 0.1
 
 

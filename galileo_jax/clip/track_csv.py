@@ -40,9 +40,7 @@ from galileo_jax.table.numbers import Rows, values_of
 from galileo_jax.table.read import ONLY
 
 TIME = "time_s"
-MIN_ROWS = 4
-"""Three differences: the fewest that show whether a speed changes."""
-
+MIN_ROWS = 4  # three differences: the fewest that show whether a speed changes
 MAX_POSITION_M = 2000.0
 FAR_M, FAR_ALONE = 100.0, 10.0
 """What is further away, and by so many times further than half of the points, is in other units."""

@@ -17,14 +17,9 @@ from galileo_jax.table.titles import LENGTHS, Title, is_no_place
 from galileo_jax.table.track_table import MIN_LIKELIHOOD
 
 PLACES = ("x", "y", "z", "line", "angle")
-EVEN_SHARE = 0.02
-"""Of its median step: a clock's steps differ by less, a body's by more."""
-
-LEAST_TICKS = 8
-"""Steps: fewer may be the same by chance."""
-
-SURE = 0.9
-"""The median of a column of likelihoods is higher."""
+EVEN_SHARE = 0.02  # of its median step: a clock's steps differ by less, a body's by more
+LEAST_TICKS = 8  # steps: fewer may be the same by chance
+SURE = 0.9  # the median of a column of likelihoods is higher
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ RATES = (
     *("export frame rate", "capture frame rate", "datarate", "camerarate"),
 )
 UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit")
-MARKERS = "marker_names"
-"""Motion capture: three columns for each of the names that follow."""
+MARKERS = "marker_names"  # motion capture: three columns for each of the names that follow
 
 
 @dataclass(frozen=True)

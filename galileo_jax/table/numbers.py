@@ -26,8 +26,7 @@ NOTHING = frozenset(
 PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 COMMA = re.compile(r"[-+]?(\d+,\d+|,\d+)(e[-+]?\d+)?", re.IGNORECASE)
 PLAIN_LETTERS = frozenset("0123456789.+-eE")
-MOST_LOOKED_AT = 500
-"""Rows: a column is of one kind, and printed in one way."""
+MOST_LOOKED_AT = 500  # rows: a column is of one kind, and printed in one way
 GROUPED = re.compile(r"[-+]?\d{1,3}(?:([,.' ])\d{3})(?:\1\d{3})*(?:([.,])\d*)?")
 """1,234.5 and 1.234,5: digits in groups of three."""
 

@@ -31,16 +31,13 @@ from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS
 from galileo_jax.table.track_table import MIN_LIKELIHOOD, Column, TrackTable
 from galileo_jax.table.tracker_trk import is_trk, read_trk
 
-ONLY = "object1"
-"""The name of an object whose columns have none."""
-
+ONLY = "object1"  # the name of an object whose columns have none
 UNIX = ((1e11, 1e-3), (1e14, 1e-6), (1e17, 1e-9))
 """From how many on, and what each is in seconds: ms, us and ns since 1970, from 1973 on."""
 
 MOST_OBJECTS = 50
 
-SAME_CLOCK = 0.01
-"""Of what goes by on one clock: another that is further off is another one."""
+SAME_CLOCK = 0.01  # of what goes by on one clock: another that is further off is another one
 
 
 def read_table(path: Path, fps: float | None = None) -> TrackTable:

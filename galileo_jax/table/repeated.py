@@ -7,13 +7,9 @@ import numpy as np
 
 from galileo_jax.table.clock import COMMON_FPS
 
-LEAST_ROWS = 4
-"""Of a motion; after fewer a smaller time is a mistake in the file."""
-MOST_STEPS = 3.0
-"""From the first row of a motion to its second."""
-ROUNDED = 1.01
-"""Units in the last place between times that were rounded up and down."""
-
+LEAST_ROWS = 4  # of a motion; after fewer a smaller time is a mistake in the file
+MOST_STEPS = 3.0  # from the first row of a motion to its second
+ROUNDED = 1.01  # units in the last place between times that were rounded up and down
 MANY_DIGITS = 100.0
 """Units in the last place of a step: what moves so far does not stand at one place by chance."""
 COPY, PLACE = 0.5, 0.25

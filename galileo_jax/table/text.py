@@ -11,9 +11,7 @@ from pathlib import Path
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.titles import count_words
 
-MAX_BYTES = 64_000_000
-"""About a million rows of six numbers."""
-
+MAX_BYTES = 64_000_000  # about a million rows of six numbers
 MARKS = (
     (b"\xef\xbb\xbf", "utf-8-sig"),
     (b"\xff\xfe\x00\x00", "utf-32"),
@@ -25,8 +23,7 @@ ENCODINGS = (
     *("cp1252", "gb18030", "shift_jis", "big5", "euc_kr", "euc_jp"),
     *("cp1251", "cp1250", "cp1253", "cp1254", "mac_roman", "koi8_r", "cp437"),
 )
-HEAD_BYTES = 4096
-"""Titles are at the top."""
+HEAD_BYTES = 4096  # titles are at the top
 
 
 def content_of(path: Path) -> bytes:

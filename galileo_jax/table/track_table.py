@@ -16,8 +16,7 @@ METRES_PER_UNIT: dict[str, float] = {
 }
 """Units of length by the words with which files and `track_units` name them."""
 
-MIN_LIKELIHOOD = 0.6
-"""DeepLabCut's own `pcutoff`: points less likely count as not seen."""
+MIN_LIKELIHOOD = 0.6  # DeepLabCut's own `pcutoff`: points less likely count as not seen
 
 
 @dataclass(frozen=True)
