@@ -10,7 +10,7 @@ The way of a film, top to bottom:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ from galileo_jax.measurement.path_direction import (
     turned_back,
     way_text,
 )
-from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, cuts_of, segment
+from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, segment
 from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
 from galileo_jax.measurement.wander_size import with_wander
@@ -98,13 +98,17 @@ class Measurement:
 
 
 def inferred(measured: Sequence[Measurement]) -> dict[str, Any]:
-    """For a result's document: `{"inferred": {clip: {key: {mean, sd}}}}` and `cuts_of`."""
+    """For a result's document: what was inferred and cut, or nothing.
+
+    `{"inferred": {clip: {key: {mean, sd}}}, "cuts": {clip: [{name, time_s, side, why}]}}`
+    """
     found = {
         one.name: {key: dict(value) for key, value in one.inferred.items()}
         for one in measured
         if one.inferred
     }
-    return ({"inferred": found} if found else {}) | cuts_of(measured)
+    cuts = {one.name: [asdict(cut) for cut in one.cuts] for one in measured if one.cuts}
+    return ({"inferred": found} if found else {}) | ({"cuts": cuts} if cuts else {})
 
 
 @dataclass

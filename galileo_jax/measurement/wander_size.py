@@ -82,13 +82,11 @@ def smooth_path(since: np.ndarray) -> Float[np.ndarray, "row row"]:
 def _pieces(observation: Observation, i: int, bounced: Sequence[int]) -> list[np.ndarray]:
     """Frames of puck `i` between hits, in pieces; a hit's own, and those beside it, are in none."""
     frames = np.flatnonzero(observation.mask[i])
-    place = observation.position_m[:, :2]
     ends = [*bounced]
-    for j in range(len(place)):
-        both = observation.mask[i] & observation.mask[j]
-        if j != i and both.any():
-            apart = np.linalg.norm(place[j] - place[i], axis=0)
-            ends.append(int(np.argmin(np.where(both, apart, np.inf))))
+    for j in range(len(observation.names)):
+        apart = observation.apart_m(i, j)
+        if j != i and np.isfinite(apart).any():
+            ends.append(int(np.argmin(apart)))
     for end in ends:
         frames = frames[np.abs(frames - end) > BESIDE_HIT]
     between = np.split(frames, np.flatnonzero(np.diff(frames) > 2 * BESIDE_HIT) + 1)

@@ -149,6 +149,11 @@ class Observation:
         found = path.frames[:-1][is_away[:-1] & is_away[1:]]
         return int(found[0]) if found.size else None
 
+    def apart_m(self, i: int, j: int) -> Float[np.ndarray, " frame"]:
+        """The distance of two objects in the plane, m; inf where not both are seen."""
+        apart = np.linalg.norm(self.position_m[j, :2] - self.position_m[i, :2], axis=0)
+        return np.where(self.mask[i] & self.mask[j], apart, np.inf)
+
     def without(self, frames: slice, objects: slice | int = slice(None)) -> "Observation":
         """The observation in which objects count as not seen in some frames."""
         mask = self.mask.copy()

@@ -25,7 +25,6 @@ class Flight:
     velocity_m_s: np.ndarray
     quaternion: np.ndarray  # `[4]`
     spin_rad_s: np.ndarray  # along the world's axes
-    acceleration_m_s2: np.ndarray  # constant, of a parabola through the flight
 
 
 def _turned(quaternion: np.ndarray) -> Any:
@@ -58,11 +57,11 @@ def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
     if last + 1 < FEWEST:
         return None
     time = poses.times_s[: last + 1] - poses.times_s[0]
-    half_bend, velocity, place = polynomial(time, poses.position_m[: last + 1], 2).solution
+    _, velocity, place = polynomial(time, poses.position_m[: last + 1], 2).solution
     since = (turned[: last + 1] * turned[0].inv()).as_rotvec()
     spin, at_first = polynomial(time, since, 1).solution
     first = type(turned).from_rotvec(at_first) * turned[0]
-    return Flight(last, place, velocity, first.as_quat(scalar_first=True), spin, 2 * half_bend)
+    return Flight(last, place, velocity, first.as_quat(scalar_first=True), spin)
 
 
 def resting_height_m(tosses: Sequence[Poses]) -> float | None:

@@ -39,9 +39,7 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
         found.extend(wander(observation, size_m, WOBBLE_S, smallest=0.0))
     hits = list[tuple[int, int]]()  # frame and object
     for i, j in combinations(range(len(position)), 2):
-        both = observation.mask[i] & observation.mask[j]
-        apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
-        apart = np.where(both, apart, np.inf)
+        apart = observation.apart_m(i, j)
         if apart.min() <= NEAR * (scene.half_length_m[i] + scene.half_length_m[j]):
             hits += [(int(np.argmin(apart)), i), (int(np.argmin(apart)), j)]
     for i, ends in product(range(len(position)), scene.walls_m):

@@ -141,14 +141,8 @@ def without_copies(
         copy = _copied(clock, places[body, axis], int(row), MANY_DIGITS * resolution[axis])
         if copy is not None:
             found[body, :, copy] = np.nan
-    rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
-    if not rows.size:
-        return places, []
-    said = (
-        f"{_listed(rows, lines)}: the place of the row beside it, to the last digit, while it "
-        "moves: a copy, which counts as not seen"
-    )
-    return found, [said]
+    why = "the place of the row beside it, to the last digit, while it moves: a copy, which counts"
+    return found, _unseen(places, found, lines, why)
 
 
 def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndarray, list[str]]:
@@ -176,18 +170,16 @@ def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndar
                 if not is_near[sides].any() and (len(sides) > 1 or len(runs) > 1):
                     found[body][:, seen[run]] = np.nan
                     values.add(", ".join(f"{one:g}" for one in each[value]))
+    why = f"{' and '.join(sorted(values))}, far from all other rows, counts"
+    return found, _unseen(places, found, lines, why)
+
+
+def _unseen(places: np.ndarray, found: np.ndarray, lines: Sequence[int], why: str) -> list[str]:
+    """A line that lists the rows of which places were left out, and says why; none: none were."""
     rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
-    if not rows.size:
-        return places, []
-    said = (
-        f"{_listed(rows, lines)}: {' and '.join(sorted(values))}, far from all other rows, counts "
-    )
-    return found, [f"{said}as not seen"]
-
-
-def _listed(rows: np.ndarray, lines: Sequence[int]) -> str:
     more = f" and {rows.size - 5} more" if rows.size > 5 else ""
-    return ", ".join(f"line {lines[row]}" for row in rows[:5]) + more
+    listed = ", ".join(f"line {lines[row]}" for row in rows[:5]) + more
+    return [f"{listed}: {why} as not seen"] if rows.size else []
 
 
 def _copied(clock: np.ndarray, values: np.ndarray, row: int, least: float) -> int | None:

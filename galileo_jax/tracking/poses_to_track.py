@@ -169,12 +169,9 @@ def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray
     result, last_end = np.zeros(len(poses), bool), 0
     for run in stretches(np.isfinite(poses[:, 0])):
         count, gap = run.stop - run.start, run.start - last_end
-        is_first, is_corrected = (
-            not last_end,
-            any(frame in range(len(poses))[run] for frame in corrected),
-        )
+        is_corrected = any(run.start <= frame < run.stop for frame in corrected)
         is_same = length(poses[run.start] - poses[last_end - 1]) < SAME_PLACE_PX
-        if is_first or is_same or is_corrected or count >= min(gap, LONG_RUN):
+        if not last_end or is_same or is_corrected or count >= min(gap, LONG_RUN):
             result[run], last_end = True, run.stop
     return result
 

@@ -20,9 +20,7 @@ what is no more the object that was marked is `Astray`.
                              come to rest
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -99,12 +97,6 @@ class Segments:
         if not any(cut.side == "after" for cut in self.cuts):
             return used
         return used.between(slice(int(np.flatnonzero(seen.any(axis=0))[-1]) + 1))
-
-
-def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
-    """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
-    found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
-    return {"cuts": found} if found else {}
 
 
 def segment(clip: Clip, observation: Observation, track: Track | None = None) -> Segments:

@@ -97,13 +97,12 @@ def longest_absence(observation: Observation) -> tuple[str, float, float] | None
 
 def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | None:
     """The first frame in which puck `i` is where another one is, and which; None: in none."""
-    own, place, found = clip.objects[i], observation.position_m[:, :2], []
+    own, found = clip.objects[i], []
     for j, other in enumerate(clip.objects):
         if j == i or own.size_m is None or other.size_m is None:
             continue
-        both = observation.mask[i] & observation.mask[j]
-        apart = np.where(both, np.linalg.norm(place[j] - place[i], axis=0), np.inf)
-        frames = np.flatnonzero(apart < APART * (own.size_m[0] + other.size_m[0]))
+        near = APART * (own.size_m[0] + other.size_m[0])
+        frames = np.flatnonzero(observation.apart_m(i, j) < near)
         found += [(int(frame), other.name) for frame in frames[:1]]
     is_level = SCENARIOS[clip.scenario].is_level
     return min(found, key=lambda one: one[0], default=None) if is_level else None
