@@ -230,19 +230,13 @@ def proposed_yaml(
     path: Path,
     table: TrackTable,
     scenario: str,
-    fps: float | None = None,
-    motions: int = 1,
-    has_floor: bool = False,
+    fps: float | None,
+    motions: int,
+    has_floor: bool,
 ) -> str:
     """The clip's yaml; what nobody can know but the user is a comment.
 
-    Args:
-      path: of the table.
-      table: the motion that is looked at.
-      scenario: the kind of motion.
-      fps: frames per second, where somebody gave them.
-      motions: how many follow each other in the file.
-      has_floor: whether the motion is thrown back by one.
+    `table`: the motion that is looked at, of so many `motions` in the file.
     """
     place = table.position[0]
     place = place[:, np.isfinite(place).all(axis=0)]

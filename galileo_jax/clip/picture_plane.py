@@ -86,27 +86,17 @@ class PicturePlane:
         return found.reshape(points.shape)
 
 
-def picture_plane(
-    clip: Clip,
-    origin_px: Sequence[float] | np.ndarray,
-    *,
-    corners_px: np.ndarray | None = None,
-    k1: float | None = None,
-) -> PicturePlane:
-    """The map that a clip declares.
+def picture_plane(clip: Clip, origin_px: Sequence[float] | np.ndarray) -> PicturePlane:
+    """The map that a clip declares, x and y being 0 at `origin_px`.
 
-    Args:
-      clip: with a rectangle or a scale, or else lengths are in nominal metres.
-      origin_px: where x and y are 0.
-      corners_px: `[4, 2]`, in place of the declared rectangle's.
-      k1: in place of the declared lens's.
+    Without a rectangle and a scale lengths are in nominal metres.
     """
     lens: dict[str, Any] = {}
     if clip.lens is not None:
         assert clip.frame_size_px is not None  # `load` asks for a video
         width, height = clip.frame_size_px
         lens = {
-            "k1": clip.lens.k1 if k1 is None else k1,
+            "k1": clip.lens.k1,
             "middle_px": ((width - 1) / 2, (height - 1) / 2),
             "unit_px": math.hypot(width, height) / 2,
         }
@@ -117,10 +107,9 @@ def picture_plane(
         return plane
     import cv2
 
-    corners = clip.rectangle.corners_px if corners_px is None else corners_px
     width, height = clip.rectangle.sides_m
     metres = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
-    straight = plane._straight(np.asarray(corners)).astype(np.float32)
+    straight = plane._straight(np.asarray(clip.rectangle.corners_px)).astype(np.float32)
     return replace(plane, homography=cv2.getPerspectiveTransform(straight, metres))
 
 
@@ -128,15 +117,19 @@ def nearby_planes(
     clip: Clip, origin_px: Sequence[float] | np.ndarray
 ) -> list[tuple[PicturePlane, PicturePlane]]:
     """The map with each declared number one standard deviation larger, and smaller."""
+
+    def plane(key: str, **other: Any) -> PicturePlane:
+        declared = getattr(clip, key).model_copy(update=other)
+        return picture_plane(clip.model_copy(update={key: declared}), origin_px)
+
     found = []
     if clip.rectangle is not None:
         corners = np.array(clip.rectangle.corners_px)
         for step in CLICK_SD_PX * np.eye(corners.size).reshape(-1, *corners.shape):
-            pair = (picture_plane(clip, origin_px, corners_px=corners + s * step) for s in (1, -1))
-            found.append(tuple(pair))
+            found.append(tuple(plane("rectangle", corners_px=corners + s * step) for s in (1, -1)))
     if clip.lens is not None and clip.lens.k1_sd:
         k1s = (clip.lens.k1 + s * clip.lens.k1_sd for s in (1, -1))
-        found.append(tuple(picture_plane(clip, origin_px, k1=k1) for k1 in k1s))
+        found.append(tuple(plane("lens", k1=k1) for k1 in k1s))
     return found
 
 

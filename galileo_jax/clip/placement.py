@@ -86,9 +86,7 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     Looks at the objects whose size and centre are known: does one reach into the ramp or
     the table, hang in the air above them, or reach into another object?
 
-    Args:
-      clip: the clip.
-      centres_m: name to `[2]`, m; x along the travel, y up, origin at the foot of the ramp.
+    `centres_m`: name to `[2]`, m; x along the travel, y up, origin at the foot of the ramp.
     """
     if not clip.is_scale_known:
         return None

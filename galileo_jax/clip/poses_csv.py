@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip.track_csv import MAX_POSITION_M, MIN_ROWS, TIME, check_times
+from galileo_jax.clip.track_csv import MAX_POSITION_M, TIME, check_times
 from galileo_jax.observation.poses import Poses
 from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.grid import read_cells
@@ -48,8 +48,6 @@ def _read(path: Path, edge_m: float | None) -> tuple[np.ndarray, np.ndarray, np.
     (_, header), *rows = read_cells(path)
     titled = {title: at for at, title in enumerate(header) if title}
     columns = {title: _column(titled, title) for title in (TIME, *PLACE, *TURN)}
-    if len(rows) < MIN_ROWS:
-        raise InputError(f"{len(rows)} rows; at least {MIN_ROWS} expected")
     for line, row in rows:
         if len(row) <= max(columns.values()):
             raise InputError(

@@ -75,8 +75,6 @@ def _observation(path: Path) -> Observation:
     names = tuple(columns)
     for line, row in rows:
         _check_length(line, row, header, columns)
-    if len(rows) < MIN_ROWS:
-        raise InputError(f"{len(rows)} rows; at least {MIN_ROWS} expected")
     table = values_of(rows, {title: at for at, title in enumerate(header)})
     times = table[TIME]
     lines = [f"line {line}" for line, _ in rows]
@@ -214,10 +212,12 @@ def _check_fields(name: str, fields: dict[str, str], of_any: set[str]) -> None:
 
 
 def check_times(times: np.ndarray, rows: Sequence[str] | None = None) -> None:
-    """Raises `InputError` unless `times` `[row]`, s, increase and are seconds.
+    """Raises `InputError` unless `times` `[row]`, s, are `MIN_ROWS`, increase and are seconds.
 
     `rows` are what the rows are called in the message; default: row 1, row 2, ...
     """
+    if len(times) < MIN_ROWS:
+        raise InputError(f"{len(times)} rows; at least {MIN_ROWS} expected")
     rows = rows or [f"row {n + 1}" for n in range(len(times))]
     if np.isnan(times).any():
         raise InputError(f"{rows[int(np.isnan(times).argmax())]}: {TIME}: empty; seconds expected")
