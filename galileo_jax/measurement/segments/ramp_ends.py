@@ -30,8 +30,8 @@ RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
 Half = tuple[float, float]  # of an object's length along the travel and of its height, m
 
 
-def ramp_end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
-    """The last frame before the first of these ends, whose it is, and why; None where none is."""
+def ramp_end(clip: Clip, observation: Observation) -> tuple[int | None, str, int]:
+    """The last frame before the first of these ends, why, and whose it is; None where none is."""
     from galileo_jax.clip.sizes import extents
 
     halves = [extents(item) if item.size_m is not None else None for item in clip.objects]
@@ -42,7 +42,8 @@ def ramp_end(clip: Clip, observation: Observation) -> tuple[int, int, str] | Non
         if i:
             found.append((_fold_frame(observation, i, halves[i - 1], half), i - 1, FOLDS))
     ends = [(frame, i, why) for frame, i, why in found if frame is not None]
-    return min(ends, default=None)
+    frame, i, why = min(ends, default=(None, 0, ""))
+    return frame, why, i
 
 
 def _tip_frame(clip: Clip, observation: Observation, i: int, half: Half | None) -> int | None:

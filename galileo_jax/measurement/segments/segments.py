@@ -20,7 +20,8 @@ what is no more the object that was marked is `Astray`.
                              come to rest
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -103,38 +104,31 @@ def segment(clip: Clip, observation: Observation, track: Track | None = None) ->
     """The segments of a track; of one made elsewhere (`track` None) nothing has gone astray."""
     scenario, whole = SCENARIOS[clip.scenario], _Kept(observation)
     if scenario.is_level:
-        whole = whole.begin_at(*_pushed_puck(observation))
-        kept = whole.end_with(_end_of_pucks(clip, whole.observation))
+        whole = whole.cut("before", *_pushed_puck(observation))
+        kept = whole.cut("after", *_end_of_pucks(clip, whole.observation))
     elif scenario.has_table:
-        kept = whole.end_with(ramp_end(clip, observation))
+        kept = whole.cut("after", *ramp_end(clip, observation))
     else:
         kept = _of_one(clip, whole)
     astray = () if track is None else find_astray(clip, kept.observation, track)
-    return Segments(tuple(cut for cut in (kept.begin, kept.end) if cut is not None), astray)
+    cuts = (kept.cuts.get(side) for side in ("before", "after"))
+    return Segments(tuple(filter(None, cuts)), astray)
 
 
 @dataclass(frozen=True)
 class _Kept:
-    """An observation without what has been left out so far."""
+    """An observation without what has been left out so far, and where it was cut on either side."""
 
     observation: Observation
-    begin: Cut | None = None
-    end: Cut | None = None
+    cuts: Mapping[str, Cut] = field(default_factory=dict)
 
-    def begin_at(self, frame: int | None, why: str, i: int = 0) -> "_Kept":
-        """Without what is before a frame that object `i` tells; None: nothing is left out."""
+    def cut(self, side: str, frame: int | None, why: str, i: int = 0) -> "_Kept":
+        """Without what is before or after a frame that object `i` tells; None: all stays."""
         if frame is None:
             return self
-        cut = Cut(self.observation.names[i], float(self.observation.times_s[frame]), "before", why)
-        return replace(self, observation=self.observation.without(slice(frame)), begin=cut)
-
-    def end_with(self, found: tuple[int, int, str] | None) -> "_Kept":
-        """Without what is after a frame that some object tells, and why; None: all stays."""
-        if found is None:
-            return self
-        frame, i, why = found
-        cut = Cut(self.observation.names[i], float(self.observation.times_s[frame]), "after", why)
-        return replace(self, observation=self.observation.without(slice(frame + 1, None)), end=cut)
+        cut = Cut(self.observation.names[i], float(self.observation.times_s[frame]), side, why)
+        gone = slice(frame) if side == "before" else slice(frame + 1, None)
+        return _Kept(self.observation.without(gone), {**self.cuts, side: cut})
 
 
 def _of_one(clip: Clip, kept: _Kept) -> _Kept:
@@ -146,24 +140,24 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     )
     if is_let_go:
         first, last = rest.placed_frames(kept.observation)
-        kept = kept.begin_at(first, PLACED).end_with(None if last is None else (last, 0, TAKEN))
+        kept = kept.cut("before", first, PLACED).cut("after", last, TAKEN)
     if clip.scenario in SWINGS:
-        kept = kept.begin_at(handling.let_go_frame(kept.observation), IS_HELD)
+        kept = kept.cut("before", handling.let_go_frame(kept.observation), IS_HELD)
     if (scenario.has_ramp or is_free) and (change := rate_change(kept.observation)) is not None:
         # Before other ends are looked for: a clock that changes looks like a blow.
         last = change[0] - (EXPOSED_FRAMES if kept.observation.is_tracked_here else 0)
-        kept = kept.end_with((last, 0, CHANGES_RATE.format(change[1])))
-    kept = kept.end_with(_end_of_one(clip, kept.observation))
+        kept = kept.cut("after", last, CHANGES_RATE.format(change[1]))
+    kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if scenario.has_ramp and scenario.angle_deg == 0:
-        return kept.begin_at(handling.pushed_frame(kept.observation), PUSHED)
+        return kept.cut("before", handling.pushed_frame(kept.observation), PUSHED)
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
-        return kept.begin_at(handling.thrown_frame(kept.observation, rest_belongs), HELD)
-    return kept.begin_at(handling.hand_frame(kept.observation), HELD) if is_let_go else kept
+        return kept.cut("before", handling.thrown_frame(kept.observation, rest_belongs), HELD)
+    return kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_let_go else kept
 
 
-def _end_of_one(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
-    """The last frame before the motion of one object ends, 0, and why; None where it goes on."""
+def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
+    """The last frame before the motion of one object ends, and why; None where it goes on."""
     is_board, is_swing = SCENARIOS[clip.scenario].has_ramp, clip.scenario in SWINGS
     is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
     ends: list[tuple[int | None, str]] = []
@@ -180,11 +174,11 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int, int, str] | 
         ends.append((find(observation), STRUCK))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:
-        return None
+        return None, ""
     last, why = min(found)
     if why == STOPPED and blow.goes_on(observation, last):
         why = STRUCK
-    return last - (EXPOSED_FRAMES if observation.is_tracked_here else 0), 0, why
+    return last - (EXPOSED_FRAMES if observation.is_tracked_here else 0), why
 
 
 def _pushed_puck(observation: Observation) -> tuple[int | None, str, int]:
@@ -200,13 +194,13 @@ def _pushed_puck(observation: Observation) -> tuple[int | None, str, int]:
     return handling.pushed_frame(alone, int(first)), PUSHED, int(first)
 
 
-def _end_of_pucks(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
-    """The first blow by a stranger, or when all that is seen has come to rest.
+def _end_of_pucks(clip: Clip, observation: Observation) -> tuple[int | None, str, int]:
+    """The last frame before a stranger's blow, or before all that is seen is at rest; why; whose.
 
     Of a film, tracks that leap are looked at by themselves: they may be of something else.
     """
     if not observation.is_tracked_here and (struck := stranger_frame(clip, observation)):
-        return *struck, STRUCK
+        return struck[0], STRUCK, struck[1]
     radii = [item.size_m[0] for item in clip.objects if item.size_m is not None]
     last = rest.rest_frame(observation, min(radii)) if radii else None
-    return None if last is None else (last, int(np.argmax(observation.mask[:, last])), RESTS)
+    return last, RESTS, 0 if last is None else int(np.argmax(observation.mask[:, last]))
