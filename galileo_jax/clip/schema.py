@@ -17,45 +17,38 @@ from galileo_jax.clip.walls import Walls
 
 
 class ClipObject(BaseModel):
-    """One object in the clip.
-
-    Attributes:
-      name: unique in the clip; also the prefix of its columns in a csv track.
-      shape: box, cylinder, torus or sphere.
-      size_m: box (length along travel, depth, height), cylinder (radius, length), torus
-        (ring radius, tube radius), sphere (radius), m; None = not known.
-      mass_kg: weighed; None = not known. A motion along a slope does not tell it, and with it
-        forces that do not grow with the mass (drag) get their unit.
-      point_px: its centre as marked by eye, pixels (x right, y down), in `first_frame`;
-        None = to be found.
-      first_frame: the first frame in which the object moves by itself; frames before are
-        not used for it. None = not known: the release is found from the motion.
-      last_frame: the last frame that is used for it; None = that of the clip.
-      corrections: (frame, x, y), px: where somebody has seen it in frames in which the program
-        had lost it; it is followed on from there.
-      rolls: whether it may roll: a cylinder on its side, a torus on edge; a sphere always may.
-        A number is its moment of inertia over m r^2, where it is not that of a solid.
-      z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
-        camera; of use to `--motion free` only.
-      spin_rad_s: flight: its spin where it was measured, along the track's axes.
-      track_name: what another tool's track file calls it; None = the same, or the only one.
-      track_file: a table of its own, on the same clock as `track`; None = it is in `track`.
-    """
+    """One object in the clip."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: fields.ObjectName
+    name: fields.ObjectName  # unique in the clip; also the prefix of its columns in a csv track
     shape: fields.Shape
+    # box (length along travel, depth, height), cylinder (radius, length), torus (ring radius, tube
+    # radius), sphere (radius), m; None = not known
     size_m: tuple[fields.Metres, ...] | None = None
+    # weighed; None = not known. A motion along a slope does not tell it, and with it forces that do
+    # not grow with the mass (drag) get their unit.
     mass_kg: fields.Kilograms | None = None
+    # its centre as marked by eye, pixels (x right, y down), in `first_frame`; None = to be found
     point_px: fields.MarkedPoint | None = None
+    # the first frame in which the object moves by itself; frames before are not used for it. None =
+    # not known: the release is found from the motion.
     first_frame: fields.Frame | None = 0
+    # the last frame that is used for it; None = that of the clip
     last_frame: fields.Frame | None = None
+    # (frame, x, y), px: where somebody has seen it in frames in which the program had lost it; it
+    # is followed on from there
     corrections: fields.Corrections = ()
+    # whether it may roll: a cylinder on its side, a torus on edge; a sphere always may. A number is
+    # its moment of inertia over m r^2, where it is not that of a solid.
     rolls: fields.Rolls = None
+    # how far its centre is from the plane in which object 1 moves, m, positive towards the camera;
+    # of use to `--motion free` only
     z_m: fields.Across = 0.0
-    spin_rad_s: fields.Spin = None
+    spin_rad_s: fields.Spin = None  # flight: its spin where it was measured, along the track's axes
+    # what another tool's track file calls it; None = the same, or the only one
     track_name: fields.OneLine | None = None
+    # a table of its own, on the same clock as `track`; None = it is in `track`
     track_file: fields.File = None
 
     @property
