@@ -19,7 +19,7 @@ import csv
 import difflib
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -99,8 +99,7 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
 
     Positions and times come back to the last digit, covariances to rounding.
     """
-    header: list[str] = [TIME]
-    columns: list[np.ndarray] = [observation.times_s]
+    columns = {TIME: observation.times_s}
     for index, name in enumerate(observation.names):
         seen, covariance = observation.mask[index], observation.covariance_m2[index]
         sd = np.sqrt(np.einsum("aat->at", covariance))
@@ -116,13 +115,19 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
         else:
             fields |= dict(zip(_COVARIANCE, (*sd, correlation), strict=True))
         for field, values in fields.items():
-            header.append(f"{name}_{field}")
-            columns.append(np.where(seen, values, np.nan))
+            columns[f"{name}_{field}"] = np.where(seen, values, np.nan)
+    write_columns(path, columns, repr)
+
+
+def write_columns(
+    path: Path, columns: Mapping[str, np.ndarray], written: Callable[[float], str]
+) -> None:
+    """Writes columns `[row]` by their titles, numbers as `written`; what is NaN is left empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in zip(*columns, strict=True):
-        writer.writerow("" if math.isnan(value) else repr(float(value)) for value in row)
+    writer.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        writer.writerow("" if math.isnan(value) else written(float(value)) for value in row)
     write_text(path, text.getvalue())
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from galileo_jax.clip.fields import MAX_ANGLE_SD_DEG, MAX_SIZE_M, MIN_RAMP_ANGLE_DEG, MIN_SIZE_M
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.sizes import extents
 from galileo_jax.numerics.least_squares import Line, line_through, two_lines
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -128,8 +129,6 @@ def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
     Raises:
       InputError: the size is unknown, or the path does not bend.
     """
-    from galileo_jax.clip.sizes import extents
-
     first = clip.objects[0]
     remedy = "set it with `galileo label --origin X Y`"
     if first.size_m is None:
@@ -165,8 +164,6 @@ def _meeting(before: Line, after: Line) -> np.ndarray:
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
     """`size_m` by name of the objects that have none; what is tracked is their centres."""
-    from galileo_jax.clip.sizes import extents
-
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     halves = [extents(item) if item.size_m else (None, None) for item in clip.objects]
     lengths = [half[0] for half in halves]

@@ -162,16 +162,8 @@ class Observation:
 
     def between(self, frames: slice) -> "Observation":
         """Some of its frames alone."""
-        modes, turned = self.modes_m, self.turned_rad
-        return replace(
-            self,
-            times_s=self.times_s[frames],
-            position_m=self.position_m[..., frames],
-            covariance_m2=self.covariance_m2[..., frames],
-            mask=self.mask[:, frames],
-            modes_m=None if modes is None else modes[..., frames],
-            turned_rad=None if turned is None else turned[:, frames],
-        )
+        arrays = {name: own for name, own in vars(self).items() if isinstance(own, np.ndarray)}
+        return replace(self, **{name: own[..., frames] for name, own in arrays.items()})
 
     def with_modes(
         self,

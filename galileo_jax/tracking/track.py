@@ -1,14 +1,12 @@
 """A track: where each object was in every frame, in pixels, with an error."""
 
-import csv
-import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from galileo_jax.runtime.atomic_write import write_text
+from galileo_jax.clip.track_csv import write_columns
 
 
 @dataclass(frozen=True)
@@ -54,9 +52,4 @@ def write_pixel_csv(path: Path, track: Track) -> None:
         }
         for field, values in fields.items():
             columns[f"{name}_{field}"] = np.where(track.is_visible[k], values, np.nan)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    for row in zip(*columns.values(), strict=True):
-        writer.writerow([f"{v:.8g}" if np.isfinite(v) else "" for v in row])
-    write_text(path, text.getvalue())
+    write_columns(path, columns, "{:.8g}".format)

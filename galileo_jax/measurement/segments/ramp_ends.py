@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sizes import extents
 from galileo_jax.measurement.infer_ramp import distance_at_hit
 from galileo_jax.observation.observation import Observation
 
@@ -32,8 +33,6 @@ Half = tuple[float, float]  # of an object's length along the travel and of its 
 
 def ramp_end(clip: Clip, observation: Observation) -> tuple[int | None, str, int]:
     """The last frame before the first of these ends, why, and whose it is; None where none is."""
-    from galileo_jax.clip.sizes import extents
-
     halves = [extents(item) if item.size_m is not None else None for item in clip.objects]
     found = [(_return_frame(observation, halves[0]), 0, RETURNS)]
     for i, (item, half) in enumerate(zip(clip.objects, halves, strict=True)):
