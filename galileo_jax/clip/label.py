@@ -150,15 +150,11 @@ def _ramp_in_plane(clip: Clip, line: Sequence[float]) -> dict[str, Any]:
         rectangle's, and what is open of the lens, make up the standard deviation.
     """
     ends = np.array(line, float).reshape(2, 2)
-    angle = _angle_deg(picture_plane(clip, ends[0]), ends)
-    apart = [
-        _angle_deg(picture_plane(clip, ends[0]), ends + step)
-        - _angle_deg(picture_plane(clip, ends[0]), ends - step)
-        for step in CLICK_SD_PX * np.eye(4).reshape(4, 2, 2)
-    ]
+    plane, steps = picture_plane(clip, ends[0]), CLICK_SD_PX * np.eye(4).reshape(4, 2, 2)
+    apart = [_angle_deg(plane, ends + step) - _angle_deg(plane, ends - step) for step in steps]
     for more, less in nearby_planes(clip, ends[0]):
         apart.append(_angle_deg(more, ends) - _angle_deg(less, ends))
-    read_off = math.hypot(*apart) / 2
+    angle, read_off = _angle_deg(plane, ends), math.hypot(*apart) / 2
     return {"ramp_angle_deg": round(angle, 3), "ramp_angle_sd_deg": float(f"{read_off:.3g}")}
 
 

@@ -141,12 +141,10 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     metres = 1 / (scale or NOMINAL_SCALE_PX_PER_M) if is_px else METRES_PER_UNIT[unit]
     seen = np.isfinite(table.position).all(axis=1).any(axis=0)
     first = int(seen.argmax())  # 0, where none was seen
-    times, table = (
-        times[first:] - times[first],
-        replace(table, position=table.position[..., first:]),
-    )
-    restored = with_lost_frames(times, table.position)
-    times, lost = restored, lost_text(of.path, times, restored)
+    as_read = times[first:] - times[first]
+    table = replace(table, position=table.position[..., first:])
+    times = with_lost_frames(as_read, table.position)
+    lost = lost_text(of.path, as_read, times)
     said: tuple[str, ...] = ()
     if table.axes == ("angle",):
         observation = swung(of, times, table.position[:, 0])

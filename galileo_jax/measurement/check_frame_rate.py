@@ -112,11 +112,8 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
 
 def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | None:
     """By one parabola where nothing more than scatter is left of it, else by those of windows."""
-    windows, size = accelerations(times, -height), len(times) - 5
-    value = _largest(windows)
-    if value is None:
-        found = None
-    else:
+    windows, size, found = accelerations(times, -height), len(times) - 5, None
+    if (value := _largest(windows)) is not None:
         scatter = 1.4826 * float(np.median(np.abs(windows - value)))
         found = ApparentGravity(value, sd=scatter / math.sqrt(len(windows) / 2))
     if size < 1 or np.ptp(height) == 0:

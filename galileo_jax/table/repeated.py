@@ -50,15 +50,12 @@ def unrounded(
         return times, []
     rows = np.arange(times.size)
     told = float(np.polyfit(rows, times, 1)[0])
-    usual = sorted((1 / fps for fps in COMMON_FPS), key=lambda step: abs(step - told))
-    agrees = [
-        step
-        for step in (usual[0], told)
-        if step > 0 and np.ptp(times - step * rows) <= ROUNDED * resolution_s
-    ]
-    if not agrees:
+    usual = min((1 / fps for fps in COMMON_FPS), key=lambda step: abs(step - told))
+    agree = (
+        each for each in (usual, told) if np.ptp(times - each * rows) <= ROUNDED * resolution_s
+    )
+    if (step := next(agree, 0.0)) <= 0:
         return times, []
-    step = agrees[0]
     said = (
         f"times in steps of {resolution_s:g} s stand in several rows; even steps of "
         f"{step:.3g} s agree with all of them and are used"

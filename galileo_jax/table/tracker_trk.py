@@ -39,11 +39,7 @@ def is_trk(content: bytes) -> bool:
 def read_trk(content: bytes) -> TrackTable:
     """The marks of all point masses, in pixels, with the calibration."""
     panel = _panel(content)
-    masses = [
-        item
-        for item in panel.findall("property[@name='tracks']/property/object")
-        if item.get("class") == POINT_MASS
-    ]
+    masses = panel.findall(f"property[@name='tracks']/property/object[@class='{POINT_MASS}']")
     marks = {_text(mass, "name") or f"mass {n + 1}": _marks(mass)
              for n, mass in enumerate(masses)}  # fmt: skip
     marks = {name: by_frame for name, by_frame in marks.items() if by_frame}

@@ -13,7 +13,7 @@ class Scenario:
     name: str  # as written in the clip yaml
     meaning: str  # one phrase for the user
     # its objects slide on a ramp or the table; it needs `ramp_angle_deg`, or has an `angle_deg`
-    has_ramp: bool
+    has_ramp: bool = False
     angle_deg: float | None = None  # of the surface, where that is no choice
     # (fewest, most) objects; None means no upper limit
     num_objects: tuple[int, int | None] = (1, 1)

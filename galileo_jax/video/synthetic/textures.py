@@ -40,8 +40,7 @@ def body_texture(body: Body, texels_per_metre: float, rng: np.random.Generator) 
     """
     width, height = (max(8, round(side * texels_per_metre)) for side in body.outline_m)
     ground = _colour(rng, saturation=(0.1, 0.5), value=(0.55, 0.95))
-    picture = np.empty((height, width, 3), np.float32)
-    picture[:] = ground
+    picture = np.full((height, width, 3), ground, np.float32)
     short_side = min(width, height)
     for size in np.geomspace(0.50, 0.10, 40) * short_side:
         centre = rng.uniform((0, 0), (width, height))
@@ -73,8 +72,7 @@ def hand_texture(
     alpha = np.zeros((height, width), np.float32)
     skin = np.array(_colour(rng, hue=(0.02, 0.08), saturation=(0.3, 0.6), value=(0.45, 0.9)))
     sleeve = np.array(_colour(rng, saturation=(0.1, 0.8), value=(0.15, 0.8)))
-    picture = np.empty((height, width, 3), np.float32)
-    picture[:] = skin
+    picture = np.full((height, width, 3), skin, np.float32)
     for finger in range(4):
         y = middle + (finger - 1.5) * 13 * unit
         knuckle = np.array([55 * unit, middle + (finger - 1.5) * 15 * unit])
@@ -106,8 +104,8 @@ def wood(size_px: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
 def wall(size_px: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
     """Returns `[height, width, 3]` float32: a plastered wall with a few pictures on it."""
     width, height = size_px
-    picture = np.empty((height, width, 3), np.float32)
-    picture[:] = _colour(rng, saturation=(0.05, 0.3), value=(0.5, 0.85))
+    plaster = _colour(rng, saturation=(0.05, 0.3), value=(0.5, 0.85))
+    picture = np.full((height, width, 3), plaster, np.float32)
     for _ in range(rng.integers(3, 7)):
         centre = rng.uniform((0, 0), (width, 0.75 * height))
         half = rng.uniform(0.04, 0.12, 2) * width

@@ -6,7 +6,6 @@ register(
     Scenario(
         name="fall",
         meaning="one object is dropped",
-        has_ramp=False,
         line="down",
         up_shows="bend",
         keys=("floor", "starts_moving"),

@@ -18,7 +18,6 @@ register(
     Scenario(
         name="flight",
         meaning="one object is thrown",
-        has_ramp=False,
         up_shows="bend",
         moves_in_plane=True,
         laws=("start_velocity",),

@@ -6,7 +6,6 @@ register(
     Scenario(
         name="from_above",
         meaning="pucks slide on a level table and hit each other, seen from above",
-        has_ramp=False,
         num_objects=(1, None),
         is_level=True,
         moves_in_plane=True,

@@ -6,7 +6,6 @@ register(
     Scenario(
         name="liquid",
         meaning="one object sinks or rises in a liquid",
-        has_ramp=False,
         line="down",
         laws=("liquid", "start_velocity"),
         without=(

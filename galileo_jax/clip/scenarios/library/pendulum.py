@@ -9,7 +9,6 @@ register(
     Scenario(
         name="pendulum",
         meaning="one object swings on a thread or a rod",
-        has_ramp=False,
         line="aside",
         up_shows="sag",
         moves_in_plane=True,

@@ -9,7 +9,6 @@ register(
     Scenario(
         name="spring",
         meaning="one object swings on a spring, hung or along a level track",
-        has_ramp=False,
         line="down",
         laws=("spring", "start_velocity"),
         without=(

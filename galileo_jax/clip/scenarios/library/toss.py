@@ -11,7 +11,6 @@ register(
     Scenario(
         name="toss",
         meaning="one box is thrown onto a table, and its turning was measured, too",
-        has_ramp=False,
         moves_in_plane=True,
         laws=("start_velocity",),
         without=(*WITHOUT, "camera_roll"),  # poses of several cameras
