@@ -60,12 +60,6 @@ def _lines(text: str) -> list[tuple[int, str]]:
     return found
 
 
-def _named_separator(lines: list[tuple[int, str]]) -> str | None:
-    """The separator that a first line `sep=;` names."""
-    found = SEPARATOR_LINE.fullmatch(lines[0][1].strip('\ufeff\r\n"'))
-    return found[1] if found and len(lines) > 1 else None
-
-
 def _likely_separator(lines: list[str]) -> str:
     """The separator in which most of the lines in the middle are as many numbers each."""
     lines = [line for line in lines if not COMMENT.match(line)] or lines
@@ -118,11 +112,11 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _split(lines: list[tuple[int, str]]) -> Rows:
-    separator = _named_separator(lines)
-    if separator is None:
-        separator = _likely_separator([line for _, line in lines])
+    named = SEPARATOR_LINE.fullmatch(lines[0][1].strip('\ufeff\r\n"'))
+    if named and len(lines) > 1:
+        separator, lines = named[1], lines[1:]
     else:
-        lines = lines[1:]
+        separator = _likely_separator([line for _, line in lines])
     if separator in (", ", " "):
         rows = [(number, _cells(line, separator)) for number, line in lines]
     else:

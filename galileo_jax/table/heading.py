@@ -50,8 +50,9 @@ def split_heading(rows: Rows) -> Heading:
       InputError: there are no numbers, or a row has more cells than titles.
     """
     width = max(len(row) for _, row in rows)
-    words = _word_columns(rows, width)
-    usual = _num_usual(rows)
+    later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
+    words = _word_columns(later, width)
+    usual = statistics.median(sum(map(bool, row)) for row in later)  # filled cells
     start = next(
         (n for n, (_, row) in enumerate(rows)
          if _is_body(row, words) and 2 * sum(map(bool, row)) > usual), None)  # fmt: skip
@@ -117,12 +118,6 @@ def _is_titles_again(row: list[str], titles: list[str]) -> bool:
     return sum(one == other and one in AXES for one, other in pairs) > 1
 
 
-def _num_usual(rows: Rows) -> float:
-    """How many cells of a row are filled, in the middle of the table."""
-    later = rows[len(rows) // 2 :][:MOST_LOOKED_AT]
-    return statistics.median(sum(map(bool, row)) for _, row in later)
-
-
 def _with_clock_above(titles: list[str], above: list[list[str]]) -> list[str]:
     """The titles, with those of a clock that stand in a row above where there is none."""
     found = list(titles)
@@ -141,12 +136,11 @@ def _has_number(row: list[str]) -> bool:
     return any(map(_is_value, row))
 
 
-def _word_columns(rows: Rows, width: int) -> set[int]:
+def _word_columns(rows: list[list[str]], width: int) -> set[int]:
     """Columns of words: labels that most rows have."""
-    later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
     found = set()
     for n in range(width):
-        cells = [row[n] for row in later if n < len(row) and not is_nothing(row[n])]
+        cells = [row[n] for row in rows if n < len(row) and not is_nothing(row[n])]
         if cells and sum(map(_is_value, cells)) < len(cells) / 2:
             found.add(n)
     return found

@@ -73,7 +73,8 @@ def _from_hdf5(path: Path) -> tuple[np.ndarray, dict[Column, np.ndarray]]:
 def _appendable(table: Any) -> tuple[np.ndarray, dict[Column, np.ndarray]]:
     """In pandas' format "table": one record per frame, the columns' names pickled beside it."""
     rows = table[:]
-    columns = _unpickled(bytes(table.attrs["values_block_0_kind"]))
+    names = _Plain(io.BytesIO(bytes(table.attrs["values_block_0_kind"]))).load()
+    columns = (tuple(str(word) for word in name) for name in names)
     values = rows["values_block_0"].astype(float)
     return rows["index"].astype(float), dict(zip(columns, values.T, strict=True))
 
@@ -96,8 +97,3 @@ class _Plain(pickle.Unpickler):
 
     def find_class(self, module_name: str, global_name: str) -> Any:
         raise pickle.UnpicklingError(f"{module_name}.{global_name} in its column names")
-
-
-def _unpickled(content: bytes) -> list[Column]:
-    columns = _Plain(io.BytesIO(content)).load()
-    return [tuple(str(word) for word in column) for column in columns]

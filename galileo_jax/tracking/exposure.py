@@ -18,13 +18,10 @@ ENOUGH_PX2 = 15e3
 
 def distinct(motions: list[np.ndarray], radius: int) -> list[np.ndarray]:
     """The `motions` during an exposure that smear a patch of this radius differently."""
-
-    def apart_px(motion: np.ndarray) -> float:
-        return length(motion) + abs(motion[2]) * radius / 2
-
     kept: list[np.ndarray] = []
     for motion in motions:
-        if all(apart_px(motion - other) >= SAME_MOTION_PX for other in kept):
+        apart = [motion - other for other in kept]
+        if all(length(one) + abs(one[2]) * radius / 2 >= SAME_MOTION_PX for one in apart):
             kept.append(motion)
     return kept
 
