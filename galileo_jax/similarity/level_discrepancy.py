@@ -11,7 +11,7 @@ from itertools import combinations, product
 import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.numerics.line_segments import nearest_frames
+from galileo_jax.numerics.line_segments import NEAR, nearest_frames
 from galileo_jax.numerics.random_patterns import alone
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
@@ -23,7 +23,6 @@ from galileo_jax.similarity.discrepancy import (
 )
 from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
 
-NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre
 
 

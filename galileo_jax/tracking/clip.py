@@ -113,14 +113,14 @@ def _seen_outline(
 def _movers(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) -> list[Mover]:
     """What moves in a film of which a mark or a size is not told; empty where the camera does."""
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
-    known = [max(size) for size in sizes if size is not None]
+    span = max((max(size) for size in sizes if size is not None), default=UNKNOWN_SPAN_PX)
     try:
         return find_movers(
             open_frames,
-            max(known) if known else UNKNOWN_SPAN_PX,
+            span,
             axes_angle_rad=_ramp_angle_rad(clip),
             may_fly=not SCENARIOS[clip.scenario].has_surface,
-            outlined=len(known) < len(sizes),
+            outlined=None in sizes,
             advance=advance,
         )
     except CameraMovesError as error:
@@ -135,7 +135,7 @@ def _with_points(clip: Clip, movers: Sequence[Mover], open_frames: OpenFrames) -
     if not missing:
         return clip
     sizes = [outline_of(clip, item).size_px for item in clip.objects]
-    span = max([max(size) for size in sizes if size is not None], default=UNKNOWN_SPAN_PX)
+    span = max((max(size) for size in sizes if size is not None), default=UNKNOWN_SPAN_PX)
     taken = [item.point_px for item in clip.objects if item.point_px is not None]
     movers = [m for m in movers if all(math.dist(m.point_px, point) > span for point in taken)]
     if len(movers) < len(missing):

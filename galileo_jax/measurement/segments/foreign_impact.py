@@ -10,10 +10,9 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.segments.blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame, jumps
-from galileo_jax.numerics.line_segments import distance_to_segment
+from galileo_jax.numerics.line_segments import NEAR, distance_to_segment
 from galileo_jax.observation.observation import Observation
 
-NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other
 STEPS_ON_WAY = 9  # places between two frames at which distances are looked at
 
 
