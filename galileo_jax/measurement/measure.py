@@ -152,11 +152,12 @@ def measure(clip: Clip) -> Measurement:
         clip, whole = _with_pucks(clip, whole, pixels, told)
     if scenario.has_table and any(item.size_m is None for item in clip.objects):
         clip = _with_sizes(clip, whole, told)
-    doubt = frame_rate_doubt(clip, whole)
     if pixels is not None:
         times_s = np.array(clip.frame_times_s)[: len(pixels.times_s)]
         told.remarks += lost_text(clip.path, times_s, pixels.times_s)
     segments = segment(clip, whole, pixels)
+    # A track that goes astray tells nothing of the clock.
+    doubt = None if segments.astray else frame_rate_doubt(clip, whole)
     told.say(*map(str, segments.cuts))
     observation = segments.used(whole)
     clip = _moving(clip, observation, segments, told)

@@ -62,6 +62,7 @@ OUTSIDE = {  # what nuisances mean that are far from what is usual
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD = 0.7
 TOLD_FACTOR = 10.0  # an interval that spans more tells no size
+SMALL = 0.01  # of a metre or a second: smaller sizes are said in thousandths
 # Residuals of the noise's size may still follow a pattern that noise does not have.
 PATTERNS = "galileo compare tests whether it has a pattern"
 
@@ -151,18 +152,20 @@ def nearness(error: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def distance(error: Mapping[str, Any]) -> str:
+def distance_text(error: Mapping[str, Any]) -> str:
     """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
-    sizes = nearness(error)
+    sizes = " or ".join(nearness(error))
     frames = f"{error['frames_used']} of {error['frames']} frames" if error.get("frames") else ""
-    said = f"{' or '.join(sizes)} off (root mean square)" if sizes else ""
-    return ", in ".join(filter(None, [said, frames]))
+    if not sizes:
+        return f"The fit uses {frames}." if frames else ""
+    said = f"The fit is {sizes} off (root mean square)"
+    return f"{said}, in {frames}." if frames else f"{said}."
 
 
 def fit_quality(result: Mapping[str, Any]) -> list[str]:
     """How near the fit comes, what it leaves, and what to do where that is too much: sentences."""
-    near = distance(result["error"])
-    said = [f"The fit is {near}."] if near else []
+    near = distance_text(result["error"])
+    said = [near] if near else []
     if "imperfections" in result:
         said += imperfection_text(result["imperfections"])
     elif not result.get("no_verdict"):
@@ -186,10 +189,16 @@ def imperfection_text(found: Mapping[str, Any]) -> list[str]:
     for entry in found.values():
         shows = entry["q975"] < TOLD_FACTOR * entry["q025"]
         if shows or not entry["ordinary"]:
-            size = f"{entry['mean']:.2g}{unit_text(entry)}"
+            size = _size_text(entry["mean"], unit_text(entry))
             usual = "as is usual" if entry["ordinary"] else "which is more than usual"
             said.append(sentence(f"{entry['meaning'].format(size=size)}, {usual}"))
     return said or ["How large each imperfection is does not show."]
+
+
+def _size_text(size: float, unit: str) -> str:
+    """A size with its unit; of a metre or a second, where it is small, in thousandths."""
+    is_small = unit in (" m", " s") and size < SMALL
+    return f"{1e3 * size:.2g} m{unit[1:]}" if is_small else f"{size:.2g}{unit}"
 
 
 def chi2_text(error: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-from galileo_jax.report.fit_text import distance
+from galileo_jax.report.fit_text import distance_text
 from galileo_jax.results.shown import interval_text, shown, unit_text
 from galileo_jax.studio.panels import parts
 from galileo_jax.studio.results import program_of
@@ -32,8 +32,8 @@ def build(tab: Tab) -> None:
             f"chi2 per degree of freedom {error['chi2_per_dof']:.3g}; velocity error "
             f"{error['rmse']:.4f} m/s (noise {error['noise']:.4f})"
         ).classes("soft small")
-        if near := distance(error):
-            ui.label(f"The fit is {near}.").classes("soft small")
+        if near := distance_text(error):
+            ui.label(near).classes("soft small")
     values = dict(session.results.live["values"]) if session.results.live is not None else {}
     for one in found["parameters"]:
         _parameter(tab, one, values)
