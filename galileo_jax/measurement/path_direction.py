@@ -77,10 +77,11 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
 def rises_forward(clip: Clip, observation: Observation) -> bool:
     """Whether object 1 goes straight up along `direction`: the board falls the other way.
 
-    By as much as it is declared to fall, where that is declared.
+    By as much as it is declared to fall, where that is declared. A table of metres has no
+    `direction`.
     """
     points = observation.position_m[0][:, observation.mask[0]]
-    if points.shape[1] < MIN_POINTS:
+    if clip.is_own_track or points.shape[1] < MIN_POINTS:
         return False
     line = line_through(points)
     away = points - line.middle[:, None]
