@@ -73,33 +73,25 @@ class Pull:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A fitted hypothesis against the data.
+    """A fitted hypothesis against the data."""
 
-    Attributes:
-      p_value: global, of the model being adequate; if the noise is misstated, with noise of
-        the size that is there.
-      where: all cells, the worst first.
-      pulls: nuisances outside their priors, the worst first.
-      error: rmse, noise, l1, l2 (m/s) and chi2_per_dof.
-      labels: of each clip `[object, frame]`, indices into `phases.PHASES`.
-      white: of each clip `[object, 2, frame]`, the tracking errors that the fit leaves, in units
-        of the stated noise.
-      noise_scale: of each clip, the errors' size over what is stated, as fitted.
-      is_noise_misstated: the residuals contradict the stated noise at the most: they look like
-        noise of `noise_scale`, and no tracker is so wrong about its own.
-      unusual: names of imperfections that are larger than such things usually are.
-      no_verdict: why too little was seen to tell whether it is adequate; None where enough was.
-    """
-
+    # global, of the model being adequate; if the noise is misstated, with noise of the size that is
+    # there
     p_value: float
-    where: tuple[Place, ...]
-    pulls: tuple[Pull, ...]
-    error: Mapping[str, float]
-    labels: tuple[np.ndarray, ...]
+    where: tuple[Place, ...]  # all cells, the worst first
+    pulls: tuple[Pull, ...]  # nuisances outside their priors, the worst first
+    error: Mapping[str, float]  # rmse, noise, l1, l2 (m/s) and chi2_per_dof
+    labels: tuple[np.ndarray, ...]  # of each clip `[object, frame]`, indices into `phases.PHASES`
+    # of each clip `[object, 2, frame]`, the tracking errors that the fit leaves, in units of the
+    # stated noise
     white: tuple[np.ndarray, ...]
-    noise_scale: tuple[float, ...]
+    noise_scale: tuple[float, ...]  # of each clip, the errors' size over what is stated, as fitted
+    # the residuals contradict the stated noise at the most: they look like noise of `noise_scale`,
+    # and no tracker is so wrong about its own
     is_noise_misstated: bool
+    # names of imperfections that are larger than such things usually are
     unusual: tuple[str, ...] = ()
+    # why too little was seen to tell whether it is adequate; None where enough was
     no_verdict: str | None = None
 
     @property

@@ -19,38 +19,29 @@ MARKED_Z = 3.0  # below it a cell is no place where the model fails
 
 @dataclass(frozen=True)
 class PathResiduals:
-    """One object of one clip; arrays are `[frame]`.
+    """One object of one clip; arrays are `[frame]`."""
 
-    Attributes:
-      clip, name: of the clip and of the object.
-      title: of a picture: the object, and its clip where there are several.
-      index: of the object.
-      times_s: of the frames.
-      measured_m: along the path, NaN where it was not tracked; 0 at the foot (incline: the start);
-        without the constant offset of the tracked point.
-      predicted_m: of the fit.
-      low_m, high_m: where 95 % of the posterior's draws are.
-      along, across: tracking errors that the fit leaves, along the path and across it, in units
-        of the stated noise.
-      phases: of the motion.
-      failing_s: the interval in which the model fails worst, None where it does not fail.
-      worst: the cell of that interval.
-    """
-
+    # names of the clip and of the object
     clip: str
     name: str
-    title: str
-    index: int
-    times_s: np.ndarray
+    title: str  # of a picture: the object, and its clip where there are several
+    index: int  # of the object
+    times_s: np.ndarray  # of the frames
+    # along the path, NaN where it was not tracked; 0 at the foot (incline: the start); without the
+    # constant offset of the tracked point
     measured_m: np.ndarray
-    predicted_m: np.ndarray
+    predicted_m: np.ndarray  # of the fit
+    # where 95 % of the posterior's draws are
     low_m: np.ndarray
     high_m: np.ndarray
+    # tracking errors that the fit leaves, along the path and across it, in units of the stated
+    # noise
     along: np.ndarray
     across: np.ndarray
-    phases: tuple[Phase, ...]
+    phases: tuple[Phase, ...]  # of the motion
+    # the interval in which the model fails worst, None where it does not fail
     failing_s: tuple[float, float] | None
-    worst: Place | None
+    worst: Place | None  # the cell of that interval
 
     @property
     def largest(self) -> float:

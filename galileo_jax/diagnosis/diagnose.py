@@ -197,19 +197,12 @@ def _with_one_effect(
 
 @dataclass(frozen=True)
 class _Conclusion:
-    """The verdict, and the world in which it is true.
+    """The verdict, and the world in which it is true."""
 
-    Attributes:
-      verdict: without what is said of the model without effects.
-      candidates: on which it is, ranked.
-      views: of the missing force, where formulas were looked for.
-      rough: the imperfect world; None: the exact one.
-    """
-
-    verdict: Verdict
-    candidates: tuple[Candidate, ...]
-    views: Sequence[View] = ()
-    rough: ImperfectWorld | None = None
+    verdict: Verdict  # without what is said of the model without effects
+    candidates: tuple[Candidate, ...]  # on which it is, ranked
+    views: Sequence[View] = ()  # of the missing force, where formulas were looked for
+    rough: ImperfectWorld | None = None  # None: the exact world
 
 
 def _concluded(

@@ -21,53 +21,35 @@ Status = Literal["none", "named", "ambiguous", "law", "unknown"]
 
 @dataclass(frozen=True)
 class Law:
-    """A formula that the missing force suggested, as fitted.
+    """A formula that the missing force suggested, as fitted."""
 
-    Attributes:
-      text: with its constants: `a = 0.83 t^0.48, object 1`.
-      family: its shape; two of a family are one formula.
-      source: its effect as Python.
-      constants: their values as text, by name.
-    """
-
-    text: str
-    family: str
-    source: str
-    constants: Mapping[str, str]
+    text: str  # with its constants: `a = 0.83 t^0.48, object 1`
+    family: str  # its shape; two of a family are one formula
+    source: str  # its effect as Python
+    constants: Mapping[str, str]  # their values as text, by name
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One hypothesis in the race.
-
-    Attributes:
-      effects: all of its effects.
-      hypothesis: the fit.
-      error: rmse, noise, chi2_per_dof, ... as in result.json.
-      score_z: of the score test at zero strength, in standard deviations.
-      log_evidence: over that of the model without effects: what the data say alone.
-      log_prior: log of its probability before the data over that of the model without effects.
-      probability: among all candidates and the model without any of them; 0 before it is ranked.
-      p_value: of its adequacy; None where it was not compared (too improbable).
-      confounded_with: candidates that these data do not tell from it.
-      law: the formula, where it is a law that the missing force suggested; else None.
-      num_constants: parameters of its effects.
-      num_expected: how many of its effects the clip leads to expect, as the drag of the air.
-      unusual: names of imperfections that are larger beside it than such things usually are.
-    """
+    """One hypothesis in the race."""
 
     effects: tuple[str, ...]
-    hypothesis: Hypothesis
-    error: dict[str, float]
-    score_z: float
-    log_evidence: float
+    hypothesis: Hypothesis  # the fit
+    error: dict[str, float]  # rmse, noise, chi2_per_dof, ... as in result.json
+    score_z: float  # of the score test at zero strength, in standard deviations
+    log_evidence: float  # over that of the model without effects: what the data say alone
+    # log of its probability before the data over that of the model without effects
     log_prior: float
+    # among all candidates and the model without any of them; 0 before it is ranked
     probability: float = 0.0
-    p_value: float | None = None
-    confounded_with: tuple[str, ...] = ()
+    p_value: float | None = None  # of its adequacy; None where it was not compared (too improbable)
+    confounded_with: tuple[str, ...] = ()  # candidates that these data do not tell from it
+    # the formula, where it is a law that the missing force suggested; else None
     law: Law | None = None
-    num_constants: int = 1
+    num_constants: int = 1  # parameters of its effects
+    # how many of its effects the clip leads to expect, as the drag of the air
     num_expected: int = 0
+    # names of imperfections that are larger beside it than such things usually are
     unusual: tuple[str, ...] = ()
 
     @property
@@ -101,54 +83,38 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Reason:
-    """A rule of the verdict that fired.
+    """A rule of the verdict that fired."""
 
-    Attributes:
-      rule: its name.
-      sentence: what it says here.
-      numbers: what it was decided by, and names of the hypotheses that it is about.
-    """
-
-    rule: str
-    sentence: str
+    rule: str  # its name
+    sentence: str  # what it says here
+    # what it was decided by, and names of the hypotheses that it is about
     numbers: Mapping[str, float | str | None]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is missing.
-
-    Attributes:
-      status: none, named, ambiguous, law or unknown.
-      effects: one effect (or set) where it is named, all that explain the data equally well
-        where it is ambiguous; a form without a name stands last; the proposed effect of a law.
-      law: the formula, where the verdict is a law, or ambiguous because one does as well.
-      form: where it is unknown: the form without a name that explains the data; None if not
-        even that is known.
-      advice: what would tell more, one sentence each.
-      reasons: the rules that fired, in their order.
-    """
+    """What is missing."""
 
     status: Status
+    # one effect (or set) where it is named, all that explain the data equally well where it is
+    # ambiguous; a form without a name stands last; the proposed effect of a law
     effects: tuple[str, ...]
+    # where it is unknown: the form without a name that explains the data; None if not even that is
+    # known
     form: str | None = None
-    advice: tuple[str, ...] = ()
-    reasons: tuple[Reason, ...] = ()
+    advice: tuple[str, ...] = ()  # what would tell more, one sentence each
+    reasons: tuple[Reason, ...] = ()  # the rules that fired, in their order
+    # the formula, where the verdict is a law, or ambiguous because one does as well
     law: Law | None = None
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the loop: a model, how it was fitted, how it compares with the data.
+    """One round of the loop: a model, how it was fitted, how it compares with the data."""
 
-    Attributes:
-      hypothesis: the fit.
-      comparison: of it with the data.
-      called: names of imperfections that count as effects, being larger than usual.
-    """
-
-    hypothesis: Hypothesis
-    comparison: Comparison
+    hypothesis: Hypothesis  # the fit
+    comparison: Comparison  # of it with the data
+    # names of imperfections that count as effects, being larger than usual
     called: tuple[str, ...] = ()
 
     @property
@@ -159,43 +125,34 @@ class Round:
 
 @dataclass(frozen=True)
 class MissingForce:
-    """The acceleration that no effect explains, inferred without a form.
+    """The acceleration that no effect explains, inferred without a form."""
 
-    Attributes:
-      time_s: `[time]`, since the release.
-      acceleration_m_s2, sd_m_s2: `[object, time]`, along the path.
-      path_m, speed_m_s: `[object, time]`, where and how fast the objects are then.
-    """
-
-    time_s: np.ndarray
+    time_s: np.ndarray  # `[time]`, since the release
+    # `[object, time]`, along the path
     acceleration_m_s2: np.ndarray
     sd_m_s2: np.ndarray
+    # `[object, time]`, where and how fast the objects are then
     path_m: np.ndarray
     speed_m_s: np.ndarray
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The whole of a diagnosis.
+    """The whole of a diagnosis."""
 
-    Attributes:
-      rounds: of the loop; the first is the model without effects (or with those given).
-      candidates: all hypotheses but the model without effects, the most probable first.
-      verdict: what is missing.
-      missing: the missing force, where the verdict is unknown or a law.
-      each_clip: of a series that no model without effects fits, each clip against the model of
-        all and by itself; else empty.
-      left_one_out: per clip of a series, the rmse (m/s) predicted from the others, before and
-        after; empty for one clip.
-      friction: of each clip along the way, where it is uneven; else empty.
-    """
-
+    # of the loop; the first is the model without effects (or with those given)
     rounds: tuple[Round, ...]
+    # all hypotheses but the model without effects, the most probable first
     candidates: tuple[Candidate, ...]
-    verdict: Verdict
-    missing: MissingForce | None = None
+    verdict: Verdict  # what is missing
+    missing: MissingForce | None = None  # where the verdict is unknown or a law
+    # per clip of a series, the rmse (m/s) predicted from the others, before and after; empty for
+    # one clip
     left_one_out: tuple[tuple[str, float, float], ...] = ()
+    # of a series that no model without effects fits, each clip against the model of all and by
+    # itself; else empty
     each_clip: tuple[EachClip, ...] = ()
+    # of each clip along the way, where it is uneven; else empty
     friction: tuple[tuple[Stretch, ...], ...] = ()
 
     @property

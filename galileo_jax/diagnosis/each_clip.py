@@ -37,23 +37,17 @@ Kind = Literal["shared", "some", "alike", "different"]
 
 @dataclass(frozen=True)
 class EachClip:
-    """One clip of several.
+    """One clip of several."""
 
-    Attributes:
-      clip: its name.
-      chi2_together, chi2_alone: per degree of freedom at the stated noise, under the model of
-        all clips and refitted by itself.
-      p_alone: of a chi2 as large as that by itself, at the noise that it asks for. (Replicates
-        say little here: what several clips determine, one alone may not.)
-      way_m: `[part + 1]`, how far object 1 has gone at the edges of the parts.
-      extra_m_s2, sd_m_s2: `[part]`, how much more it accelerates than the model of all clips.
-    """
-
-    clip: str
+    clip: str  # its name
+    # per degree of freedom at the stated noise, under the model of all clips and refitted by itself
     chi2_together: float
     chi2_alone: float
+    # of a chi2 as large as that by itself, at the noise that it asks for (replicates say little
+    # here: what several clips determine, one alone may not)
     p_alone: float
-    way_m: np.ndarray
+    way_m: np.ndarray  # `[part + 1]`, how far object 1 has gone at the edges of the parts
+    # `[part]`, how much more it accelerates than the model of all clips
     extra_m_s2: np.ndarray
     sd_m_s2: np.ndarray
 

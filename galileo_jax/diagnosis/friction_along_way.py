@@ -30,19 +30,14 @@ STEP = 1e-4  # of z, for slopes
 
 
 class Stretch(NamedTuple):
-    """The friction of one body on a stretch of its way.
+    """The friction of one body on a stretch of its way."""
 
-    Attributes:
-      name: of the body.
-      steps: between how many frames: 1, 2, 4, ...
-      from_m, to_m: past the foot; on a slope alone, from where the track counts.
-      mean, sd: of the mean coefficient.
-    """
-
-    name: str
-    steps: int
+    name: str  # of the body
+    steps: int  # between how many frames: 1, 2, 4, ...
+    # past the foot; on a slope alone, from where the track counts
     from_m: float
     to_m: float
+    # of the mean coefficient
     mean: float
     sd: float
 

@@ -32,20 +32,13 @@ NUM_SINGLE, NUM_FORMS, NUM_PAIRS, NUM_LAWS = 6, 2, 2, 2
 
 @dataclass(frozen=True)
 class ImperfectWorld:
-    """The model without effects and candidates, each with imperfections.
+    """The model without effects and candidates, each with imperfections."""
 
-    Attributes:
-      base: without effects.
-      comparison: of it with the data.
-      table: ranked; evidence is over that of `base`.
-      judge: of this world.
-      friction: of each clip, where friction varies by more than is usual; else empty.
-    """
-
-    base: Hypothesis
-    comparison: Comparison
-    table: tuple[Candidate, ...]
-    judge: Judge
+    base: Hypothesis  # without effects
+    comparison: Comparison  # of it with the data
+    table: tuple[Candidate, ...]  # ranked; evidence is over that of `base`
+    judge: Judge  # of this world
+    # of each clip, where friction varies by more than is usual; else empty
     friction: tuple[tuple[Stretch, ...], ...] = ()
 
     @property

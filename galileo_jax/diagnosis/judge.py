@@ -30,20 +30,13 @@ from galileo_jax.search.hypothesis import Hypothesis
 
 @dataclass(frozen=True)
 class Judge:
-    """Judges the candidates of one world.
+    """Judges the candidates of one world."""
 
-    Attributes:
-      trials: what was diagnosed.
-      decisive: difference in log odds, nats, at which one hypothesis rules out another.
-      seed: of the comparisons' replicates.
-      on_stage: told what is being done.
-      comparisons: made so far, with the fits that were compared, by effects.
-    """
-
-    trials: JointProblem
-    decisive: float
-    seed: int
-    on_stage: Callable[[str], None] = lambda _: None
+    trials: JointProblem  # what was diagnosed
+    decisive: float  # difference in log odds, nats, at which one hypothesis rules out another
+    seed: int  # of the comparisons' replicates
+    on_stage: Callable[[str], None] = lambda _: None  # told what is being done
+    # made so far, with the fits that were compared, by effects
     comparisons: dict[tuple[str, ...], tuple[GradientFit, Comparison]] = field(default_factory=dict)
 
     def comparison(self, hypothesis: Hypothesis) -> Comparison:

@@ -85,26 +85,17 @@ def infer_missing_force(
 
 @dataclass(frozen=True)
 class View:
-    """One clip fitted with a free acceleration.
+    """One clip fitted with a free acceleration."""
 
-    Attributes:
-      trials: the clip alone, its model with the free acceleration.
-      fit: with the free acceleration.
-      residual: `[value]`, whitened at the fitted noise scales.
-      effect: the free acceleration.
-      time_s: `[time]`.
-      path_m, speed_m_s: `[object, time]`, of the fit.
-      moves: `[object, time]`, whether it is seen to move.
-    """
-
-    trials: JointProblem
-    fit: GradientFit
-    residual: np.ndarray
+    trials: JointProblem  # the clip alone, its model with the free acceleration
+    fit: GradientFit  # with the free acceleration
+    residual: np.ndarray  # `[value]`, whitened at the fitted noise scales
     effect: FreeAcceleration
-    time_s: np.ndarray
+    time_s: np.ndarray  # `[time]`
+    # `[object, time]`, of the fit
     path_m: np.ndarray
     speed_m_s: np.ndarray
-    moves: np.ndarray
+    moves: np.ndarray  # `[object, time]`, whether it is seen to move
 
     @property
     def model(self) -> Model:

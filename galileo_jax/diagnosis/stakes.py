@@ -29,15 +29,10 @@ from galileo_jax.search.table import Stakes
 
 @dataclass(frozen=True)
 class VerdictStakes(Stakes):
-    """The rules of the verdict, for a search.
+    """The rules of the verdict, for a search."""
 
-    Attributes:
-      trials: what is diagnosed.
-      is_adequate: whether the model without effects leaves nothing but noise.
-    """
-
-    trials: JointProblem
-    is_adequate: bool
+    trials: JointProblem  # what is diagnosed
+    is_adequate: bool  # whether the model without effects leaves nothing but noise
 
     def log_prior(self, hypothesis: Hypothesis) -> float:
         """Log of its probability before the data over that of the model without effects."""

@@ -30,21 +30,15 @@ ONE_SD = 0.683  # of normal values so many are within one standard deviation
 
 @dataclass(frozen=True)
 class PredictedExperiment:
-    """What one hypothesis predicts, in units of the noise.
+    """What one hypothesis predicts, in units of the noise."""
 
-    Attributes:
-      mean: `[value]`.
-      slopes: `[value, coordinate]`.
-      rest: `[value]`, variance that the slopes leave; of the inner two thirds of the draws, so
-        that a few far ones do not drown what all others tell.
-      hits: share of the draws in which another object is hit.
-      root: `[shared parameter, coordinate]`, how the trials' parameters (z) follow from u.
-    """
-
-    mean: np.ndarray
-    slopes: np.ndarray
+    mean: np.ndarray  # `[value]`
+    slopes: np.ndarray  # `[value, coordinate]`
+    # `[value]`, variance that the slopes leave; of the inner two thirds of the draws, so that a few
+    # far ones do not drown what all others tell
     rest: np.ndarray
-    hits: float
+    hits: float  # share of the draws in which another object is hit
+    # `[shared parameter, coordinate]`, how the trials' parameters (z) follow from u
     root: np.ndarray
 
 

@@ -12,19 +12,15 @@ import numpy as np
 class Convergence:
     """Of one quantity.
 
-    Attributes:
-      rhat: rank-normalized split R-hat; 1 is agreement, above 1.01 the chains disagree.
-        NaN where nothing moved.
-      ess_bulk: effective draws for the mean.
-      ess_tail: effective draws for the 5 % and 95 % quantiles.
-
     Source: Vehtari, Gelman, Simpson, Carpenter, Buerkner, Rank-normalization, folding, and
     localization: an improved R-hat, Bayesian Analysis 16 (2021), 10.1214/20-BA1221.
     """
 
+    # rank-normalized split R-hat; 1 is agreement, above 1.01 the chains disagree; NaN where nothing
+    # moved
     rhat: float
-    ess_bulk: float
-    ess_tail: float
+    ess_bulk: float  # effective draws for the mean
+    ess_tail: float  # effective draws for the 5 % and 95 % quantiles
 
 
 def arviz() -> ModuleType:

@@ -44,14 +44,12 @@ def noise_explains(chi2: float, degrees: float, noise_scale: float = 1.0) -> boo
 class JointProblem:
     """Clips of the same objects.
 
-    Attributes:
-      problems: one per clip, all with the same effects and, as `with_shared_parameters` leaves
-        them, the same priors of what they share.
-
     Raises:
       ValueError: by the first use of its parameters; what clips share has several priors.
     """
 
+    # one per clip, all with the same effects and, as `with_shared_parameters` leaves them, the same
+    # priors of what they share
     problems: tuple[Problem, ...]
 
     @cached_property

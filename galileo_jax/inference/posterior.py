@@ -33,22 +33,15 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws of named parameters.
+    """Draws of named parameters."""
 
-    Attributes:
-      names: the parameters' names.
-      draws: `[chain, draw, parameter]`.
-      log_density: `[chain, draw]`, unnormalized, in the space that was sampled.
-      status: how the sampling ended.
-      stats: numbers about the sampling (steps, evaluations, acceptance rate).
-      provenance: settings, seed and versions; anything that JSON can hold.
-    """
-
-    names: tuple[str, ...]
-    draws: np.ndarray
-    log_density: np.ndarray
-    status: Status
+    names: tuple[str, ...]  # of the parameters
+    draws: np.ndarray  # `[chain, draw, parameter]`
+    log_density: np.ndarray  # `[chain, draw]`, unnormalized, in the space that was sampled
+    status: Status  # how the sampling ended
+    # numbers about the sampling (steps, evaluations, acceptance rate)
     stats: Mapping[str, float] = field(default_factory=dict)
+    # settings, seed and versions; anything that JSON can hold
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

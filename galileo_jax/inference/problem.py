@@ -37,22 +37,14 @@ from galileo_jax.statespace.terms import TERMS
 
 @dataclass(frozen=True)
 class Problem:
-    """A clip and a model.
+    """A clip and a model."""
 
-    Attributes:
-      observation: what was measured.
-      model: scene and effects.
-      engine: rolls the model out.
-      name: of the clip.
-      noise: see `whitening_in`.
-      sizes: of imperfections by name, `statespace.sizes.Sizes.x`; None: there are none.
-    """
-
-    observation: Observation
-    model: Model
-    engine: Engine
-    name: str = "clip"
-    noise: NoiseModel = "camera"
+    observation: Observation  # what was measured
+    model: Model  # scene and effects
+    engine: Engine  # rolls the model out
+    name: str = "clip"  # of the clip
+    noise: NoiseModel = "camera"  # see `whitening_in`
+    # of imperfections by name, `statespace.sizes.Sizes.x`; None: there are none
     sizes: Mapping[str, float] | None = None
 
     @property

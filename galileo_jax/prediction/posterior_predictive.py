@@ -22,23 +22,17 @@ NUM_DRAWS = 100
 
 @dataclass(frozen=True)
 class PosteriorPredictive:
-    """The fit in the frames of the clip.
+    """The fit in the frames of the clip."""
 
-    Attributes:
-      observation: what was measured.
-      position_m: `[draw, object, 2, frame]`, predicted positions of the tracked points.
-      offset_m: `[object, 2]`, tracked point minus centre; `position_m` contains each draw's.
-      residuals: `[object, 2, frame]`, the tracking errors that the best fit leaves, in units of the
-        stated noise; NaN where nothing was measured.
-      phases: of each object.
-      hits_s: when each object but the last hits the next; None = it does not.
-    """
-
-    observation: Observation
-    position_m: np.ndarray
+    observation: Observation  # what was measured
+    position_m: np.ndarray  # `[draw, object, 2, frame]`, predicted positions of the tracked points
+    # `[object, 2]`, tracked point minus centre; `position_m` contains each draw's
     offset_m: np.ndarray
+    # `[object, 2, frame]`, the tracking errors that the best fit leaves, in units of the stated
+    # noise; NaN where nothing was measured
     residuals: np.ndarray
-    phases: tuple[tuple[Phase, ...], ...]
+    phases: tuple[tuple[Phase, ...], ...]  # of each object
+    # when each object but the last hits the next; None = it does not
     hits_s: tuple[float | None, ...]
 
     @property

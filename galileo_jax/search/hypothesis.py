@@ -11,16 +11,11 @@ from galileo_jax.inference.joint_problem import JointProblem
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """Effects that are there, and the fit with them.
+    """Effects that are there, and the fit with them."""
 
-    Attributes:
-      effects: names, in the order in which they were added.
-      fit: of all parameters.
-      trials: whose parameters these are, where not the diagnosis's own: of a law.
-    """
-
-    effects: tuple[str, ...]
-    fit: GradientFit
+    effects: tuple[str, ...]  # names, in the order in which they were added
+    fit: GradientFit  # of all parameters
+    # whose parameters these are, where not the diagnosis's own: of a law
     trials: JointProblem | None = None
 
     @property

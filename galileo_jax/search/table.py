@@ -37,31 +37,23 @@ class Stakes:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A place in the space of all parameters from which a hypothesis is searched for.
+    """A place in the space of all parameters from which a hypothesis is searched for."""
 
-    Attributes:
-      effects: of the hypothesis.
-      z: `[model parameter]`, each with a unit normal prior.
-      parent: what it was made from, None where nothing was known; with its last effect added, a
-        score test says what that effect explains.
-      move: name of the move that proposes it.
-      rivals: of a move's starts of a hypothesis with the same label only the best is followed.
-      is_near: whether it is refined at once: beside a fit a race, which assumes more noise, would
-        not tell the valleys apart.
-      cost: where a race ended, nats; there `z` is.
-      promise: that less what the width of the valley is worth.
-      num_agreeing: starts of the race that ended in its valley; 0: there was none.
-    """
-
-    effects: tuple[str, ...]
+    effects: tuple[str, ...]  # of the hypothesis
+    # of the models, without noise scales; each with a unit normal prior
     z: Float[np.ndarray, " parameter"]
+    # what it was made from, None where nothing was known; with its last effect added, a score test
+    # says what that effect explains
     parent: Hypothesis | None
-    move: str
+    move: str  # name of the move that proposes it
+    # of a move's starts of a hypothesis with the same label only the best is followed
     rivals: int = 0
+    # whether it is refined at once: beside a fit a race, which assumes more noise, would not tell
+    # the valleys apart
     is_near: bool = False
-    cost: float = np.nan
-    promise: float = np.nan
-    num_agreeing: int = 0
+    cost: float = np.nan  # where a race ended, nats; there `z` is
+    promise: float = np.nan  # that less what the width of the valley is worth
+    num_agreeing: int = 0  # starts of the race that ended in its valley; 0: there was none
 
     @property
     def key(self) -> Key:
@@ -71,19 +63,13 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A row of the table.
+    """A row of the table."""
 
-    Attributes:
-      hypothesis: with the best fit.
-      fits: in every valley that was found.
-      score_z: what its last effect's slope explained beside its parent, in standard deviations.
-      num_agreeing: starts of the race that found it which ended in its valley.
-    """
-
-    hypothesis: Hypothesis
-    fits: tuple[GradientFit, ...]
+    hypothesis: Hypothesis  # with the best fit
+    fits: tuple[GradientFit, ...]  # in every valley that was found
+    # what its last effect's slope explained beside its parent, in standard deviations
     score_z: float = 0.0
-    num_agreeing: int = LEAST_AGREEING
+    num_agreeing: int = LEAST_AGREEING  # starts of the race that found it which ended in its valley
 
     def with_fits(self, fits: Sequence[GradientFit], by: float = 0.0) -> "Entry":
         """The same with more fits; one that is better `by` nats takes the place of the old one."""
@@ -96,29 +82,21 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """All hypotheses fitted so far.
+    """All hypotheses fitted so far."""
 
-    Attributes:
-      fitter: of trials whose models have the whole library.
-      stakes: what hangs on each.
-      seed: of the starts.
-      entries: by the effects, in no order; that without effects is there after the first round.
-      is_explained: whether noise, or what is as usual as noise, explains what a fit leaves.
-      mask: `[model parameter]`, those that every hypothesis has.
-      asked: what moves proposed already: name of the move, of what, from which evidence.
-      num_rounds: of the loop, so far.
-      most_effects: at once, of the hypotheses that are looked for.
-    """
-
-    fitter: GradientFitter
-    stakes: Stakes
-    seed: int
+    fitter: GradientFitter  # of trials whose models have the whole library
+    stakes: Stakes  # what hangs on each
+    seed: int  # of the starts
+    # by the effects, in no order; that without effects is there after the first round
     entries: Mapping[Key, Entry]
+    # whether noise, or what is as usual as noise, explains what a fit leaves
     is_explained: Callable[[Hypothesis], bool]
+    # of the models, without noise scales: those that every hypothesis has
     mask: Bool[np.ndarray, " parameter"]
+    # what moves proposed already: name of the move, of what, from which evidence
     asked: frozenset[tuple[str, Key, Key, float]] = frozenset()
-    num_rounds: int = 0
-    most_effects: int = 1
+    num_rounds: int = 0  # of the loop, so far
+    most_effects: int = 1  # at once, of the hypotheses that are looked for
 
     @classmethod
     def of(cls, fitter: GradientFitter, stakes: Stakes, seed: int, base: Hypothesis) -> "Table":

@@ -41,19 +41,12 @@ LEAST_FRICTION = 0.05  # a friction's strength is a share of its coefficient
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law in the model.
+    """A law in the model."""
 
-    Attributes:
-      structure: its formula.
-      source: its class, as written in proposed_effect.py.
-      hypothesis: the fit, with the trials it is of.
-      score: nats, of the screening.
-    """
-
-    structure: Structure
-    source: str
-    hypothesis: Hypothesis
-    score: float
+    structure: Structure  # the formula
+    source: str  # its class, as written in proposed_effect.py
+    hypothesis: Hypothesis  # the fit, with the trials it is of
+    score: float  # nats, of the screening
 
     @property
     def trials(self) -> JointProblem:

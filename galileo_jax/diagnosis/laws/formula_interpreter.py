@@ -115,12 +115,9 @@ def _factor(factors: Sequence[Factor], own: Sequence[Array], place: tuple, xp: A
 
 @dataclass(frozen=True, eq=False)
 class OneLaw(Share):
-    """Part of a model: without its formulas, but with the one that acts in each rollout.
+    """Part of a model: without its formulas, but with the one that acts in each rollout."""
 
-    Attributes:
-      formulas: of each, where its strength and constants stand, and its numbers.
-    """
-
+    # of each, where its strength and constants stand, and its numbers
     formulas: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...] = ()
 
     def of(self, theta: np.ndarray) -> np.ndarray:

@@ -24,36 +24,22 @@ VARIETIES = {"far_q": "pulse_q", "slope_q": "pull_q"}
 
 @dataclass(frozen=True)
 class Constant:
-    """One constant of a factor.
+    """One constant of a factor."""
 
-    Attributes:
-      unit: SI.
-      prior: a prior, or "within": uniform over what is seen of the variable.
-      grid: values tried, or how many of what is seen of the variable.
-    """
-
-    unit: str
-    prior: Prior | None
-    grid: Sequence[float] | int
+    unit: str  # SI
+    prior: Prior | None  # None: uniform over what is seen of the variable
+    grid: Sequence[float] | int  # values tried, or how many of what is seen of the variable
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A shape.
+    """A shape."""
 
-    Attributes:
-      name: of the shape in its variable: "power", "wave".
-      variable: t, q or v.
-      code: Python, of t, q, v, xp and the constants.
-      text: as a physicist writes it; constants in braces.
-      constants: by name.
-    """
-
-    name: str
+    name: str  # of the shape in its variable: "power", "wave"
     variable: Variable
-    code: str
-    text: str
-    constants: Mapping[str, Constant]
+    code: str  # Python, of t, q, v, xp and the constants
+    text: str  # as a physicist writes it; constants in braces
+    constants: Mapping[str, Constant]  # by name
 
     @property
     def label(self) -> str:
@@ -175,17 +161,11 @@ FACTORS = (
 
 @dataclass(frozen=True)
 class Structure:
-    """A formula without values for its constants.
+    """A formula without values for its constants."""
 
-    Attributes:
-      nature: see `model.effects.law`.
-      is_on_all: else on object 1.
-      factors: one or two, of different variables.
-    """
-
-    nature: Nature
-    is_on_all: bool
-    factors: tuple[Factor, ...]
+    nature: Nature  # see `model.effects.law`
+    is_on_all: bool  # else on object 1
+    factors: tuple[Factor, ...]  # one or two, of different variables
 
     @property
     def family(self) -> str:

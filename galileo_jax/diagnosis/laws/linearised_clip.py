@@ -14,21 +14,13 @@ LEAST_FRICTION = -0.05  # that a coefficient may come to, beyond minus itself: i
 
 @dataclass(frozen=True)
 class LinearisedClip:
-    """One clip's target and responses, all else made part of the noise.
+    """One clip's target and responses, all else made part of the noise."""
 
-    Attributes:
-      view: the clip's.
-      target: `[value]`.
-      responses: of each object `[value, time]`.
-      masses: of the objects, kg, as fitted; 0 of those without.
-      frictions: their coefficients, likewise.
-    """
-
-    view: View
-    target: np.ndarray
-    responses: tuple[np.ndarray, ...]
-    masses: np.ndarray
-    frictions: np.ndarray
+    view: View  # the clip's
+    target: np.ndarray  # `[value]`
+    responses: tuple[np.ndarray, ...]  # of each object `[value, time]`
+    masses: np.ndarray  # of the objects, kg, as fitted; 0 of those without
+    frictions: np.ndarray  # their coefficients, likewise
 
     @classmethod
     def of(cls, view: View) -> "LinearisedClip":

@@ -39,18 +39,13 @@ Shape = tuple[str, str, bool]
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A formula that is worth a fit.
-
-    Attributes:
-      structure: of the formula.
-      starts: constants by name, the best first, none near another; `c` is the strength on the
-        first object, of a friction times its coefficient.
-      score: nats, see above.
-    """
+    """A formula that is worth a fit."""
 
     structure: Structure
+    # constants by name, the best first, none near another; `c` is the strength on the first object,
+    # of a friction times its coefficient
     starts: tuple[Mapping[str, float], ...]
-    score: float
+    score: float  # nats, see above
 
 
 def suggestions(

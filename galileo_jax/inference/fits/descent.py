@@ -69,23 +69,15 @@ class GiveUp(NamedTuple):
 
 
 class Descended(NamedTuple):
-    """Where points arrived.
+    """Where points arrived."""
 
-    Attributes:
-      best: the points and their costs.
-      first_cost: `[point]`, where they began.
-      widths: `[point, model parameter]`, half a conditional sd, see `Descent.half_sd`.
-      is_settled: `[point]`; False where steps ran out or it was given up.
-      num_steps: how many there were.
-      joined: `[point]`, which point of its owner each is in the same valley as, and behind; its
-        own index where none.
-    """
-
-    best: Quadratic
-    first_cost: np.ndarray
-    widths: np.ndarray
-    is_settled: np.ndarray
-    num_steps: int
+    best: Quadratic  # the points and their costs
+    first_cost: np.ndarray  # `[point]`, where they began
+    widths: np.ndarray  # `[point, model parameter]`, half a conditional sd, see `Descent.half_sd`
+    is_settled: np.ndarray  # `[point]`; False where steps ran out or it was given up
+    num_steps: int  # how many there were
+    # `[point]`, which point of its owner each is in the same valley as, and behind; its own index
+    # where none
     joined: np.ndarray
 
 
@@ -157,19 +149,14 @@ def valleys(ends: Quadratic, rows: np.ndarray) -> list[int]:
 
 @dataclass(frozen=True)
 class Descent:
-    """Levenberg-Marquardt on the residuals of trials.
+    """Levenberg-Marquardt on the residuals of trials."""
 
-    Attributes:
-      residuals: of the trials.
-      coarse_steps: `[model parameter]`, as `JointProblem.coarse_steps`.
-      is_smooth: whether motion is smooth at every scale: slopes are then taken over small steps.
-      sides: of differences. Those ahead cost half and lead to within some hundredths of a standard
-        deviation of the mode.
-    """
-
-    residuals: Residuals
-    coarse_steps: np.ndarray
+    residuals: Residuals  # of the trials
+    coarse_steps: np.ndarray  # `[model parameter]`, as `JointProblem.coarse_steps`
+    # whether motion is smooth at every scale: slopes are then taken over small steps
     is_smooth: bool
+    # of differences; those ahead cost half and lead to within some hundredths of a standard
+    # deviation of the mode
     sides: Sides
 
     def __call__(
@@ -247,21 +234,15 @@ class Descent:
 
 
 class Polished(NamedTuple):
-    """Modes.
+    """Modes."""
 
-    Attributes:
-      points: with fitted noise scales.
-      widths: `[point, model parameter]`, steps of differences at the posterior's scale, in z.
-      is_settled: `[point]`.
-      lowest: the least cost with what noise scales cost, nats.
-      rows: `[point]`, which of the points given: those that came to the valley of a better one of
-        their owner are left out.
-    """
-
-    points: Batch
+    points: Batch  # with fitted noise scales
+    # of the models' parameters: steps of differences at the posterior's scale, in z
     widths: Float[np.ndarray, "point parameter"]
-    is_settled: Bool[np.ndarray, " point"]
-    lowest: float
+    is_settled: Bool[np.ndarray, " point"]  # False where steps ran out or it was given up
+    lowest: float  # the least cost with what noise scales cost, nats
+    # which of the points given: those that came to the valley of a better one of their owner are
+    # left out
     rows: Int[np.ndarray, " point"]
 
 

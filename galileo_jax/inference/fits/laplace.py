@@ -30,41 +30,28 @@ class Code(StrEnum):
 
 @dataclass(frozen=True)
 class GradientFit:
-    """The best fit of one hypothesis and the normal approximation round it.
+    """The best fit of one hypothesis and the normal approximation round it."""
 
-    Attributes:
-      z: `[parameter]`, the mode, noise scales last; 0 where pinned.
-      free: `[parameter]`, which parameters the hypothesis has.
-      covariance: `[parameter, parameter]`, in z; 0 where pinned.
-      chi2: sum of the squared tracking errors that are left, in units of the stated noise.
-      log_evidence: of the hypothesis, by Laplace, up to the data's constant.
-      num_values: how many numbers were measured.
-      steps: `[model parameter]`, the difference steps of the final Jacobian, in z.
-      jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit, clip after clip;
-        values as in `Problem.whiten`; 0 where pinned.
-      code: how it ended.
-      stats: rollouts it took.
-      pull: how far the nuisances are from what is expected: the sum of the squares of their
-        `prior_deviations`.
-      num_pulled: how many numbers' worth of the data the nuisances were fitted with.
-      beside: fits in other valleys that explain the data about as well; they share the posterior.
-      sizes: of imperfections, with which it was fitted; None: there are none.
-    """
-
-    z: Float[np.ndarray, " parameter"]
-    free: Bool[np.ndarray, " parameter"]
-    covariance: Float[np.ndarray, "parameter parameter"]
-    chi2: float
-    log_evidence: float
-    num_values: int
+    z: Float[np.ndarray, " parameter"]  # the mode, noise scales last; 0 where pinned
+    free: Bool[np.ndarray, " parameter"]  # which parameters the hypothesis has
+    covariance: Float[np.ndarray, "parameter parameter"]  # in z; 0 where pinned
+    chi2: float  # sum of the squared tracking errors that are left, in units of the stated noise
+    log_evidence: float  # of the hypothesis, by Laplace, up to the data's constant
+    num_values: int  # how many numbers were measured
+    # difference steps of the final Jacobian, in z
     steps: Float[np.ndarray, " model_parameter"]
+    # d(whitened residual)/dz at the fit, clip after clip; values as in `Problem.whiten`; 0 where
+    # pinned
     jacobian: Float[np.ndarray, "value model_parameter"]
-    code: Code
-    stats: dict[str, float]
+    code: Code  # how it ended
+    stats: dict[str, float]  # rollouts it took
+    # how far the nuisances are from what is expected: the sum of the squares of their
+    # `prior_deviations`
     pull: float
-    num_pulled: float
+    num_pulled: float  # how many numbers' worth of the data the nuisances were fitted with
+    # fits in other valleys that explain the data about as well; they share the posterior
     beside: tuple["GradientFit", ...] = ()
-    sizes: Sizes | None = None
+    sizes: Sizes | None = None  # of imperfections, with which it was fitted; None: there are none
 
     def points(self, z: Float[np.ndarray, "point parameter"]) -> Batch:
         """Points with this fit's own noise and parameters."""

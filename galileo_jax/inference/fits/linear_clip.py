@@ -57,18 +57,13 @@ WIDER = 1.3  # than the normal approximation round a mode is what is drawn there
 
 @dataclass(frozen=True)
 class LinearClip:
-    """What of one clip tells sizes and parameters.
+    """What of one clip tells sizes and parameters."""
 
-    Attributes:
-      e: `[value]`, residuals at z = 0.
-      slopes: `[value, model parameter]`, J; 0 where pinned.
-      fixed: `[value, value]`, U U^T, the covariance whatever the sizes are.
-      of_terms: by the term's name, K at the median `[value, value]`.
-    """
-
-    e: Float[np.ndarray, " value"]
-    slopes: Float[np.ndarray, "value parameter"]
+    e: Float[np.ndarray, " value"]  # residuals at z = 0
+    slopes: Float[np.ndarray, "value parameter"]  # J, by the models' parameters; 0 where pinned
+    # U U^T, the covariance whatever the sizes are
     fixed: Float[np.ndarray, "value value"]
+    # by the term's name, K at the median
     of_terms: dict[str, Float[np.ndarray, "value value"]]
 
     def covariance(

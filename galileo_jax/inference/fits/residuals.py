@@ -38,19 +38,14 @@ class Batch(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Residuals of points and how they change with each point's free parameters.
+    """Residuals of points and how they change with each point's free parameters."""
 
-    Attributes:
-      jacobian: for each clip `[point, value, free]`; 0 beyond a point's own number of them.
-      white: for each clip `[point, value]`.
-      index: `[point, free]`, where these stand among the models'; beyond, the count of all.
-      count: of the models' parameters.
-    """
-
+    # for each clip; 0 beyond a point's own number of them
     jacobian: list[Float[np.ndarray, "point value free"]]
-    white: list[Float[np.ndarray, "point value"]]
+    white: list[Float[np.ndarray, "point value"]]  # for each clip
+    # where the free parameters stand among the models'; beyond, the count of all
     index: Int[np.ndarray, "point free"]
-    count: int
+    count: int  # of the models' parameters
 
     def among_all(self, values: np.ndarray, axis: int = 1) -> np.ndarray:
         """Numbers of free parameters along an axis as numbers of all: 0 of those pinned."""

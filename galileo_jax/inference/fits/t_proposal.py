@@ -37,19 +37,13 @@ class Proposal(Protocol):
 
 @dataclass(frozen=True)
 class Cloud:
-    """An elliptical distribution of the free parameters; the others are 0.
+    """An elliptical distribution of the free parameters; the others are 0."""
 
-    Attributes:
-      mean: `[free]`, z.
-      root: `[free, free]`, symmetric; its square is the covariance of a normal of the same width.
-      free: `[parameter]`.
-      freedom: degrees of it, of Student's t; infinite: normal.
-    """
-
-    mean: Float[np.ndarray, " free"]
+    mean: Float[np.ndarray, " free"]  # z
+    # symmetric; its square is the covariance of a normal of the same width
     root: Float[np.ndarray, "free free"]
-    free: Bool[np.ndarray, " parameter"]
-    freedom: float = FREEDOM
+    free: Bool[np.ndarray, " parameter"]  # which parameters these are
+    freedom: float = FREEDOM  # degrees of it, of Student's t; infinite: normal
 
     @classmethod
     def of(cls, z: Points, log_weights: Values, free: Bool[np.ndarray, " parameter"]) -> "Cloud":

@@ -44,25 +44,18 @@ PRIOR_DRAWS_PER_DIMENSION = 5
 
 @dataclass(frozen=True)
 class Settings:
-    """How long to sample.
+    """How long to sample."""
 
-    Attributes:
-      warmup_steps: per chain, discarded; the sampler is tuned after each block of them.
-        200 with eight chains mend a covariance that is wrong by a factor of four.
-      block_steps: per chain, between two looks at convergence, two checkpoints and two
-        reports, whole turns of the sampler; a Ctrl-C takes effect at the end of a block.
-      max_steps: per chain, after the warm-up, where convergence does not come before.
-      max_rhat: stop when R-hat of every monitored quantity is below.
-      min_ess: and its bulk effective sample size is at least this.
-      stops_early: False runs `max_steps`, whatever the diagnostics say.
-    """
-
+    # per chain, discarded; the sampler is tuned after each block of them; 200 with eight chains
+    # mend a covariance that is wrong by a factor of four
     warmup_steps: int = 200
+    # per chain, between two looks at convergence, two checkpoints and two reports, whole turns of
+    # the sampler; a Ctrl-C takes effect at the end of a block
     block_steps: int = 25
-    max_steps: int = 4000
-    max_rhat: float = 1.01
-    min_ess: float = 400.0
-    stops_early: bool = True
+    max_steps: int = 4000  # per chain, after the warm-up, where convergence does not come before
+    max_rhat: float = 1.01  # stop when R-hat of every monitored quantity is below
+    min_ess: float = 400.0  # and its bulk effective sample size is at least this
+    stops_early: bool = True  # False runs `max_steps`, whatever the diagnostics say
 
     def __post_init__(self) -> None:
         for name in ("block_steps", "max_steps"):
@@ -78,19 +71,14 @@ class Settings:
 
 @dataclass(frozen=True)
 class Progress:
-    """What a progress bar needs, after each block.
+    """What a progress bar needs, after each block."""
 
-    Attributes:
-      num_steps: per chain, warm-up included; `max_steps` likewise.
-      is_warmup: True while the sampler is still being tuned.
-      acceptance_rate: of the latest block.
-      convergence: of the monitored quantities at the latest look; empty in the warm-up.
-    """
-
+    # per chain, warm-up included
     num_steps: int
     max_steps: int
-    is_warmup: bool
-    acceptance_rate: float
+    is_warmup: bool  # True while the sampler is still being tuned
+    acceptance_rate: float  # of the latest block
+    # of the monitored quantities at the latest look; empty in the warm-up
     convergence: Mapping[str, Convergence]
 
 

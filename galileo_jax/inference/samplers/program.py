@@ -15,14 +15,11 @@ class Program(eqx.Module):
 
     Two of the same code and shapes share compiled programs, also those that `kept` leaves on
     disk; a closure over its data is compiled for itself alone.
-
-    Attributes:
-      code: a function and what it is to be compiled for; hashable, and named as `kept` asks.
-      arrays: PyTree of arrays, the data.
     """
 
+    # a function and what it is to be compiled for; hashable, and named as `kept` asks
     code: tuple = eqx.field(static=True)
-    arrays: Any
+    arrays: Any  # PyTree of arrays, the data
 
     def __call__(self, position: jax.Array) -> jax.Array:
         """`[dim] -> []`."""
