@@ -23,22 +23,14 @@ Law = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class World(NamedTuple):
-    """What else there is in an experiment, in its own terms; every default is nothing.
+    """What else there is in an experiment, in its own terms; every default is nothing."""
 
-    Attributes:
-      force: N `[object, 3]` at the centres.
-      friction: the objects' coefficients `[object]`.
-      restitution: of the objects' hit.
-      start_m_s: object 1's speed down the ramp when it is let go.
-      table_rad: how much the table falls away from the ramp.
-      steeper_rad, late_s, longer, slower: what is declared wrongly (see `bullet_effects.film`).
-    """
-
-    force: Law | None = None
-    friction: Law | None = None
-    restitution: float = 0.0
-    start_m_s: float = 0.0
-    table_rad: float = 0.0
+    force: Law | None = None  # N `[object, 3]` at the centres
+    friction: Law | None = None  # the objects' coefficients `[object]`
+    restitution: float = 0.0  # of the objects' hit
+    start_m_s: float = 0.0  # object 1's speed down the ramp when it is let go
+    table_rad: float = 0.0  # how much the table falls away from the ramp
+    # what is declared wrongly (see `bullet_effects.film`)
     steeper_rad: float = 0.0
     late_s: float = 0.0
     longer: float = 0.0

@@ -117,21 +117,13 @@ exotic("magnet", "force",
 
 
 class HiddenLaw(NamedTuple):
-    """A law and what counts as having found it.
+    """A law and what counts as having found it."""
 
-    Attributes:
-      kind: push, drag or friction.
-      formula: for a strength of one; of t, q, v and the array module.
-      size: of the strength, median.
-      variables: that it depends on.
-      power: of the only variable; None where it is no power.
-    """
-
-    kind: Kind
-    formula: Formula
-    size: float
-    variables: str
-    power: float | None = None
+    kind: Kind  # push, drag or friction
+    formula: Formula  # for a strength of one; of t, q, v and the array module
+    size: float  # of the strength, median
+    variables: str  # that it depends on
+    power: float | None = None  # of the only variable; None where it is no power
 
 
 LAWS = {

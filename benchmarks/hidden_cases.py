@@ -38,20 +38,14 @@ TRACK: dict[str, Any] = {"track_only": True, "solver": "fine", "faults": True}
 
 @dataclass(frozen=True)
 class Case:
-    """Clips that are diagnosed together.
+    """Clips that are diagnosed together."""
 
-    Attributes:
-      name: unique.
-      yamls: the clips' yamls, a NAME.truth.json beside each.
-      effect: what is hidden in them, as the truth says it.
-      strength: of our own clips, 0 to 1; None where it is not known or nothing is hidden.
-      recipe: the arguments of `simulate` that make the clips; None if they are there.
-    """
-
-    name: str
-    yamls: tuple[Path, ...]
-    effect: str
+    name: str  # no two have the same
+    yamls: tuple[Path, ...]  # the clips' yamls, a NAME.truth.json beside each
+    effect: str  # what is hidden in them, as the truth says it
+    # of our own clips, 0 to 1; None where it is not known or nothing is hidden
     strength: float | None = None
+    # the arguments of `simulate` that make the clips; None if they are there
     recipe: Mapping[str, Any] | None = None
 
 

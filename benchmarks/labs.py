@@ -36,19 +36,12 @@ HIDDEN = "hidden_"  # what the effects of `exotic_effects.py` are called before 
 
 @dataclass(frozen=True)
 class SimulatedLab:
-    """Simulated by the integrator that does not fit, with the small faults of real clips.
+    """Simulated by the integrator that does not fit, with the small faults of real clips."""
 
-    Attributes:
-      folder: of its files.
-      effect: hidden, of the library or `hidden_LAW`; "none".
-      seed: of objects, strength and noise.
-      noise: "px": 0.3 px; "speed": velocities known to 7.5 % of the speed's range.
-    """
-
-    folder: Path
-    effect: str
-    seed: int
-    noise: Noise
+    folder: Path  # of its files
+    effect: str  # hidden, of the library or `hidden_LAW`; "none"
+    seed: int  # of objects, strength and noise
+    noise: Noise  # "px": 0.3 px; "speed": velocities known to 7.5 % of the speed's range
 
     @property
     def truth(self) -> Path:

@@ -28,21 +28,13 @@ SUFFICIENT = 1.5  # chi2 per value with which a refined start counts as converge
 
 
 class Estimate(NamedTuple):
-    """What a peer says.
+    """What a peer says."""
 
-    Attributes:
-      values: `[4]`, in the order of `MAIN`.
-      entries: k1, k2 and mass_ratio as in result.json.
-      centres_m: `[object, 2, frame]`, of its own rollout at `values`.
-      num_rollouts: it took.
-      is_converged: by its own account.
-    """
-
-    values: np.ndarray
-    entries: dict[str, dict[str, Any]]
-    centres_m: np.ndarray
-    num_rollouts: int
-    is_converged: bool
+    values: np.ndarray  # `[4]`, in the order of `MAIN`
+    entries: dict[str, dict[str, Any]]  # k1, k2 and mass_ratio as in result.json
+    centres_m: np.ndarray  # `[object, 2, frame]`, of its own rollout at `values`
+    num_rollouts: int  # it took
+    is_converged: bool  # by its own account
 
 
 def sysid(problem: Problem, noise_m_s: float, seed: int) -> Estimate:

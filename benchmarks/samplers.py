@@ -71,22 +71,15 @@ COLUMNS = (
 
 
 class Answer(NamedTuple):
-    """What one method says about one track.
+    """What one method says about one track."""
 
-    Attributes:
-      estimates: k1, k2 and mass_ratio as `scoring.score` takes them.
-      predicted_m: centres `[object, 2, frame]` of its own rollout at its best parameters.
-      num_free: parameters.
-      num_rollouts: it took.
-      is_converged: by its own account.
-      draws: k1, k2 and the log mass ratio `[quantity, chain, draw]`, if it draws from a posterior.
-    """
-
-    estimates: Mapping[str, Any]
+    estimates: Mapping[str, Any]  # k1, k2 and mass_ratio as `scoring.score` takes them
+    # centres `[object, 2, frame]` of its own rollout at its best parameters
     predicted_m: np.ndarray
-    num_free: int
-    num_rollouts: float
-    is_converged: bool
+    num_free: int  # parameters
+    num_rollouts: float  # it took
+    is_converged: bool  # by its own account
+    # k1, k2 and the log mass ratio `[quantity, chain, draw]`, if it draws from a posterior
     draws: np.ndarray | None = None
 
 

@@ -10,21 +10,13 @@ QUANTITIES = ("k1", "k2", "mass_ratio")
 
 
 class Score(NamedTuple):
-    """One quantity of one fit.
+    """One quantity of one fit."""
 
-    Attributes:
-      error: estimate - truth; of the mass ratio relative to the truth; NaN = not told.
-      sd: that is stated for it; NaN: none is.
-      is_covered: the 95 % interval holds the truth; None where there is no interval.
-      is_identified: the fit says so.
-      is_expected: the truth says that the data can tell it.
-    """
-
-    error: float
-    sd: float
-    is_covered: bool | None
-    is_identified: bool
-    is_expected: bool = True
+    error: float  # estimate - truth; of the mass ratio relative to the truth; NaN = not told
+    sd: float  # that is stated for it; NaN: none is
+    is_covered: bool | None  # the 95 % interval holds the truth; None where there is no interval
+    is_identified: bool  # the fit says so
+    is_expected: bool = True  # the truth says that the data can tell it
 
     @property
     def z(self) -> float:

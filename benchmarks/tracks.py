@@ -25,15 +25,10 @@ FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
 
 @dataclass(frozen=True)
 class Case:
-    """A truth and one noisy measurement of it.
+    """A truth and one noisy measurement of it."""
 
-    Attributes:
-      truth: what it was made with.
-      trials: the observation alone, with the base model, ready for inference.
-    """
-
-    truth: Truth
-    trials: JointProblem
+    truth: Truth  # what it was made with
+    trials: JointProblem  # the observation alone, with the base model, ready for inference
 
     @property
     def problem(self) -> Problem:

@@ -25,28 +25,18 @@ SERIES_BARS = {**BARS, "named_right": (">=", 0.90)}
 
 @dataclass(frozen=True)
 class Score:
-    """One diagnosed case.
+    """One diagnosed case."""
 
-    Attributes:
-      truth: effects that are there.
-      kind: "none", all of them in the library, or one that is not ("exotic").
-      label: the verdict in a word or two: a column of the confusion matrix.
-      is_named_right: one hypothesis, the true one. Of "none": that nothing is missing.
-      is_covered: named right, or ambiguous with the truth among at most three.
-      is_confident_wrong: one hypothesis, a wrong one. Of "none": any alarm.
-      is_recognised: that something is missing which cannot be named: unknown, ambiguous or a law.
-      set_size: number of hypotheses reported; NaN where the truth is not among them.
-      before, after: rms residual in units of the noise, without and with what was added.
-    """
-
-    truth: frozenset[str]
-    kind: Kind
-    label: str
-    is_named_right: bool
-    is_covered: bool
-    is_confident_wrong: bool
+    truth: frozenset[str]  # effects that are there
+    kind: Kind  # nothing is there, all is in the library, or something is not ("exotic")
+    label: str  # the verdict in a word or two: a column of the confusion matrix
+    is_named_right: bool  # one hypothesis, the true one; of "none": that nothing is missing
+    is_covered: bool  # named right, or ambiguous with the truth among at most three
+    is_confident_wrong: bool  # one hypothesis, a wrong one; of "none": any alarm
+    # that something is missing which cannot be named: unknown, ambiguous or a law
     is_recognised: bool
-    set_size: float
+    set_size: float  # number of hypotheses reported; NaN where the truth is not among them
+    # rms residual in units of the noise, without and with what was added
     before: float
     after: float
 

@@ -26,25 +26,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Experiment:
-    """One ramp experiment.
+    """One ramp experiment."""
 
-    Attributes:
-      mass_kg, friction: of object 1 and object 2.
-      angle_rad: of the ramp, in (0, pi / 2).
-      size_m: (length along the travel, height) of each object.
-      release_m: distance along the ramp from its foot up to the point under object 1's
-        centre at t = 0, where it is let go at rest.
-      object2_x_m: where object 2's centre stands; None = there is no object 2.
-      gravity: m/s^2.
-    """
-
+    # of object 1 and object 2
     mass_kg: tuple[float, float]
     friction: tuple[float, float]
-    angle_rad: float
+    angle_rad: float  # of the ramp, in (0, pi / 2)
+    # (length along the travel, height) of each object
     size_m: tuple[tuple[float, float], tuple[float, float]]
+    # distance along the ramp from its foot up to the point under object 1's centre at t = 0, where
+    # it is let go at rest
     release_m: float
-    object2_x_m: float | None
-    gravity: float = 9.81
+    object2_x_m: float | None  # where object 2's centre stands; None = there is no object 2
+    gravity: float = 9.81  # m/s^2
 
 
 @dataclass(frozen=True)
@@ -84,19 +78,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class Solution:
-    """The motion at the times asked for.
+    """The motion at the times asked for."""
 
-    Attributes:
-      times_s: `[time]`, s since the release.
-      position_m, velocity_m_s: `[object, 2, time]`, m and m/s.
-      pitch_rad: `[object, time]`, counter-clockwise positive.
-      foot_s, hit_s: when object 1's centre turned, and when it met object 2; None = never.
-    """
-
-    times_s: np.ndarray
+    times_s: np.ndarray  # `[time]`, s since the release
+    # `[object, 2, time]`, m and m/s
     position_m: np.ndarray
     velocity_m_s: np.ndarray
-    pitch_rad: np.ndarray
+    pitch_rad: np.ndarray  # `[object, time]`, counter-clockwise positive
+    # when object 1's centre turned, and when it met object 2; None = never
     foot_s: float | None
     hit_s: float | None
 

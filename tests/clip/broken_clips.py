@@ -52,17 +52,12 @@ objects:
 
 @dataclass(frozen=True)
 class BrokenClip:
-    """One wrong input.
+    """One wrong input."""
 
-    Attributes:
-      id: for pytest.
-      build: makes the files in an empty folder and returns the CLIP argument.
-      words: what the one line must contain, beginning with the file's name.
-    """
-
-    id: str
+    id: str  # for pytest
+    # makes the files in an empty folder and returns the CLIP argument
     build: Callable[[Path], Path]
-    words: tuple[str, ...]
+    words: tuple[str, ...]  # what the one line must contain, beginning with the file's name
 
 
 @functools.cache

@@ -19,24 +19,16 @@ MOST_CELLS = 5  # between two kills
 
 @dataclass(frozen=True)
 class Killed:
-    """What came of it.
+    """What came of it."""
 
-    Attributes:
-      undisturbed, disturbed: the folders.
-      seconds: that the undisturbed sweep took.
-      num_killed: runs that were not at their end already.
-      done: how many cells there were after each kill.
-      partial: files that could not be read after a kill.
-      left_alive: workers that outlived the sweep by half a second.
-    """
-
+    # folders
     undisturbed: Path
     disturbed: Path
-    seconds: float
-    num_killed: int
-    done: list[int]
-    partial: list[Path]
-    left_alive: int
+    seconds: float  # that the undisturbed sweep took
+    num_killed: int  # runs that were not at their end already
+    done: list[int]  # how many cells there were after each kill
+    partial: list[Path]  # files that could not be read after a kill
+    left_alive: int  # workers that outlived the sweep by half a second
 
     @property
     def is_same(self) -> bool:

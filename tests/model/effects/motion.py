@@ -63,26 +63,21 @@ INCLINE: Surroundings = replace(
 
 @dataclass(frozen=True)
 class Motion:
-    """One rollout.
+    """One rollout."""
 
-    Attributes:
-      times_s: `[record]`.
-      position_m, velocity_m_s: `[object, 2, record]`.
-      gone_m, speed_m_s: `[object, record]`, distance from the start (across a bend: wrong by
-        the corner cut) and speed, positive downhill and away from the ramp.
-    """
-
-    times_s: np.ndarray
-    position_m: np.ndarray
-    velocity_m_s: np.ndarray
+    times_s: np.ndarray  # `[record]`
+    position_m: np.ndarray  # `[object, 2, record]`
+    velocity_m_s: np.ndarray  # `[object, 2, record]`
 
     @property
     def gone_m(self) -> np.ndarray:
+        """`[object, record]`, from the start, positive downhill; wrong by a bend's corner cut."""
         step = self.position_m - self.position_m[..., :1]
         return np.hypot(step[:, 0], step[:, 1]) * np.sign(step[:, 0])
 
     @property
     def speed_m_s(self) -> np.ndarray:
+        """`[object, record]`, positive downhill and away from the ramp."""
         x, y = self.velocity_m_s[:, 0], self.velocity_m_s[:, 1]
         return np.hypot(x, y) * np.sign(x)
 
