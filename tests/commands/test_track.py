@@ -13,7 +13,7 @@ from galileo_jax.commands import command
 from galileo_jax.commands.track import main
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.clip import track_clip
-from tests.tracking.moving_box import Box, film
+from tests.tracking.moving_box import Box, Labelled, film
 
 pytestmark = pytest.mark.video
 
@@ -21,7 +21,7 @@ FIRST, SECOND = Box(seed=0), Box(seed=4)
 SCALE = 400.0
 
 
-def write_clip(folder, frames, points):
+def write_clip(folder, frames, points, size_m=(0.08, 0.06, 0.065)):
     video = folder / "clip.mp4"
     size = frames[0].shape[1::-1]
     writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, size)
@@ -29,7 +29,7 @@ def write_clip(folder, frames, points):
         writer.write(frame)
     writer.release()
     objects = [
-        {"name": f"object{k + 1}", "shape": "box", "size_m": [0.08, 0.06, 0.065]}
+        {"name": f"object{k + 1}", "shape": "box", "size_m": size_m and list(size_m)}
         | ({"point_px": point} if point else {})
         for k, point in enumerate(points)
     ]
@@ -93,6 +93,19 @@ def test_one_declared_point_is_not_given_away_again(tmp_path, frames, paths):
     np.testing.assert_allclose(track.position_px[0, 0], paths[0][0, :2], atol=2)
     # The first frame's noise is its own: where the object stood is the mean of its rest.
     np.testing.assert_allclose(track.position_px[1, 0], (160.0, 80.0), atol=0.03)
+
+
+def test_a_box_of_unknown_size_is_compared_over_all_that_is_seen_of_it(tmp_path):
+    """It is plain where it is marked: a window there would show nothing."""
+    time = np.arange(40.0)
+    gone = 3.0 * np.clip(time - 6, 0, 40)
+    way = np.stack([50 + gone, 60 + 0.4 * gone, 0 * time], axis=1)
+    frames = film([(Labelled(), way)], size_px=(280, 180))
+    clip = load_clip(write_clip(tmp_path, frames, [[52.0, 63.0]], size_m=None))
+    track = track_clip(clip)
+    assert track.is_visible.all()
+    travelled = track.position_px[0] - track.position_px[0, 0]
+    np.testing.assert_allclose(travelled, way[:, :2] - way[0, :2], atol=0.15)
 
 
 def test_nothing_moves_and_no_point_asks_for_label(tmp_path, frames, capsys):

@@ -6,7 +6,7 @@ import pytest
 from galileo_jax.tracking.detect import find_movers, fit_outline
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.template import Outline, grey
-from tests.tracking.moving_box import RELEASE, Box, Labelled, film, throw
+from tests.tracking.moving_box import RELEASE, Box, Labelled, Ringed, film, throw
 
 pytestmark = pytest.mark.video
 
@@ -84,6 +84,21 @@ def test_what_comes_to_where_a_thing_was_does_not_make_it_larger():
     assert len(movers) == 2
     for mover, path in zip(movers, (first, second), strict=True):
         np.testing.assert_allclose(mover.point_px, path[0, :2], atol=1.5)
+
+
+def test_a_hand_is_no_part_of_the_box_that_it_lets_go():
+    """It covers a part of the box at first, and both set out in the same frame."""
+    time = np.arange(40.0)
+    gone = np.clip(time - 6, 0, 30)
+    box = np.stack([90 + 4.0 * gone, 100 + 0 * time, 0 * time], axis=1)
+    hand = np.stack([56 - 3.0 * gone, 78 - 5.0 * gone, 0 * time], axis=1)
+    frames = film([(Ringed(), box), (Box((56, 44), seed=7), hand)], size_px=(320, 160))
+    first, *others = find_movers(lambda: iter(frames), 44)
+    np.testing.assert_allclose(first.point_px, box[0, :2], atol=2)
+    size = np.ptp(first.places_px, axis=0) + 2.0
+    np.testing.assert_allclose(size, Ringed().size_px, rtol=0.1)
+    assert all(other.leaves_picture for other in others)
+    np.testing.assert_allclose(first.way_px[20], box[20, :2] - box[0, :2], atol=0.5)
 
 
 def test_two_things_that_set_out_together_and_part_are_two():
