@@ -23,7 +23,7 @@ NUM_TRIED, SPREAD_Z = 8, 0.8
 def test_a_stuck_fit_is_led_to_where_a_start_at_the_truth_goes(tmp_path):
     path = tmp_path / "clip.csv"
     call = {"effects": PATCH, "strength": 1.0, "track_only": True, "track_noise": 1e-4}
-    (told,) = simulate(path, seed=2, **call).truths
+    (told,) = simulate(path, seed=1, **call).truths
     truth = told | told["effect_parameters"]
     clip = load_clip(path.with_suffix(".yaml"))
     seen = [read_observation_csv(path)]
