@@ -33,7 +33,6 @@ MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
 BEGIN_SHARE, LEAST_BEND = 0.5, 0.01  # of a valley's way; by so many rad its slope changes there
 SIZE_SD_M = 0.003  # a marked point is the centre, and a height right, no better
 NUM_BESIDE = 3  # frames on either side of a hit through which the distance's lines are laid
-CLEARLY = 5.0  # standard deviations by which an object must move to have been hit
 
 
 @dataclass(frozen=True)

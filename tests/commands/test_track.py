@@ -98,14 +98,14 @@ def test_one_declared_point_is_not_given_away_again(tmp_path, frames, paths):
 def test_a_box_of_unknown_size_is_compared_over_all_that_is_seen_of_it(tmp_path):
     """It is plain where it is marked: a window there would show nothing."""
     time = np.arange(40.0)
-    gone = 3.0 * np.clip(time - 6, 0, 40)
-    way = np.stack([50 + gone, 60 + 0.4 * gone, 0 * time], axis=1)
-    frames = film([(Labelled(), way)], size_px=(280, 180))
-    clip = load_clip(write_clip(tmp_path, frames, [[52.0, 63.0]], size_m=None))
+    gone = 5.0 * np.clip(time - 6, 0, 40)
+    way = np.stack([70 + gone, 60 + 0.3 * gone, 0 * time], axis=1)
+    frames = film([(Labelled((100, 70)), way)], size_px=(320, 180))
+    clip = load_clip(write_clip(tmp_path, frames, [[71.0, 62.0]], size_m=None))
     track = track_clip(clip)
     assert track.is_visible.all()
     travelled = track.position_px[0] - track.position_px[0, 0]
-    np.testing.assert_allclose(travelled, way[:, :2] - way[0, :2], atol=0.15)
+    np.testing.assert_allclose(travelled, way[:, :2] - way[0, :2], atol=0.8)
 
 
 def test_nothing_moves_and_no_point_asks_for_label(tmp_path, frames, capsys):

@@ -15,7 +15,11 @@ NOISE_M = 5e-4
 
 
 def write_track(
-    folder: Path, sizes: tuple[str, str], restitution: float = 0.0, moves: bool = True
+    folder: Path,
+    sizes: tuple[str, str],
+    restitution: float = 0.0,
+    moves: bool = True,
+    noise_m: float = NOISE_M,
 ) -> Path:
     """Box 1 comes down, crosses the foot and hits box 2, 0.25 m further on; they go on evenly."""
     times = np.arange(60) / 30
@@ -35,10 +39,10 @@ def write_track(
     points = np.array([x1, y1, x2, y2])
     if not moves:
         points[:] = points[:, :1]
-    points += np.random.default_rng(4).normal(0, NOISE_M, points.shape)
+    points += np.random.default_rng(4).normal(0, noise_m, points.shape)
     titles = "time_s,object1_x_m,object1_y_m,object1_sd_m,object2_x_m,object2_y_m,object2_sd_m"
     rows = [
-        f"{t:.6f},{a:.6f},{b:.6f},{NOISE_M},{c:.6f},{d:.6f},{NOISE_M}"
+        f"{t:.6f},{a:.6f},{b:.6f},{noise_m},{c:.6f},{d:.6f},{noise_m}"
         for t, (a, b, c, d) in zip(times, points.T, strict=True)
     ]
     (folder / "hit.csv").write_text("\n".join([titles, *rows]) + "\n")
@@ -87,3 +91,21 @@ def test_known_sizes_are_left_alone(tmp_path: Path) -> None:
     sizes = ("[0.066, 0.05, 0.079]", "[0.058, 0.05, 0.073]")
     measured = measure(load_clip(write_track(tmp_path, sizes)))
     assert not measured.inferred and not measured.remarks
+
+
+def test_what_stirs_before_the_hit_was_not_hit_then(tmp_path: Path) -> None:
+    """A shadow, or a coder, shifts what rests by more than its errors."""
+    path = write_track(tmp_path, ("null", "null"), noise_m=2e-5)
+    table = tmp_path / "hit.csv"
+    title, first, *rows = table.read_text().splitlines()
+    stirs = 2.5e-4 * np.linspace(0, 1, 12) ** 2  # all rest meanwhile
+    rest = [first.split(",") for _ in stirs]
+    for number, (row, by) in enumerate(zip(rest, stirs, strict=True)):
+        row[0], row[4] = f"{(number - len(rest)) / 30:.6f}", f"{float(row[4]) + by:.6f}"
+    moved = [first.split(","), *(row.split(",") for row in rows)]
+    for row in moved:
+        row[4] = f"{float(row[4]) + stirs[-1]:.6f}"
+    table.write_text("\n".join([title, *map(",".join, [*rest, *moved])]) + "\n")
+    first, second = (item.size_m for item in measure(load_clip(path)).clip.objects)
+    assert first is not None and second is not None
+    assert first[0] / 2 + second[0] / 2 == pytest.approx(sum(LENGTHS) / 2, abs=0.01)

@@ -116,3 +116,31 @@ def test_a_level_table_has_no_angle(tmp_path):
     path.write_text(path.read_text() + "ramp_angle_deg: 2\n")
     with pytest.raises(gx.InputError, match="ramp_angle_deg: 2 given; scenario level"):
         load_clip(path)
+
+
+@pytest.mark.parametrize("said", ["null", "20", "20\ndirection: left"])
+def test_what_is_pushed_up_a_board_tells_where_it_falls(tmp_path, said):
+    """Up to the right, and back, in a picture's pixels."""
+    angle, start_m_s, px_per_m = math.radians(20), 2.0, 1000
+    times = np.arange(60) / 60
+    up, down = (G * (math.sin(angle) + sign * K1 * math.cos(angle)) for sign in (1, -1))
+    since_top = np.clip(times - start_m_s / up, 0, None)
+    rising = np.minimum(times, start_m_s / up)
+    gone = start_m_s * rising - up * rising**2 / 2 - down * since_top**2 / 2
+    place = np.outer([math.cos(angle), -math.sin(angle)], px_per_m * gone)
+    place += np.array([[200], [560]])
+    place += 0.1 * np.random.default_rng(0).standard_normal(place.shape)
+    rows = [f"{t},{x},{y}" for t, x, y in zip(times, *place, strict=True)]
+    (tmp_path / "up.csv").write_text("\n".join(["t,x,y", *rows]) + "\n")
+    path = tmp_path / "up.yaml"
+    path.write_text(
+        "track: up.csv\ntrack_units: px\ntrack_y: down\nscenario: incline\n"
+        f"ramp_angle_deg: {said}\npixels_per_metre: {px_per_m}\n"
+        "objects: [{name: object1, shape: box}]\n"
+    )
+    measured = measure(load_clip(path))
+    assert measured.clip.direction == "left" and measured.way is None
+    assert measured.clip.ramp_angle_deg == pytest.approx(20, abs=0.1)
+    assert any("goes up to the right" in line for line in measured.remarks) == ("left" not in said)
+    found = gx.fit(path).parameters["k1"]
+    assert found["q025"] - 0.002 < K1 < found["q975"] + 0.002

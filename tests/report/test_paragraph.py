@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from galileo_jax.report.fit_text import distance_text, imperfection_text
 from galileo_jax.report.paragraph import paragraph
 
 ERROR = {"rms_mm": 0.81, "rms_percent_of_way": 0.21, "chi2_per_dof": 1.0}
@@ -165,3 +166,16 @@ def test_a_distance_that_nobody_knows_is_not_told():
     known = result(k1=entry(0.1, 0.01)) | {"error": {"rms_mm": None, "rms_percent_of_way": None}}
     assert "follows" not in paragraph(known, CHECK, None, ["torus"])
     assert paragraph(known, CHECK, None, ["torus"]).startswith("The ring moved with a friction")
+
+
+def test_frames_are_told_where_no_distance_is_known():
+    assert distance_text({"frames_used": 35, "frames": 120}) == "The fit uses 35 of 120 frames."
+    said = distance_text({"rms_mm": 2.0, "frames_used": 35, "frames": 120})
+    assert said == "The fit is 2 mm off (root mean square), in 35 of 120 frames."
+
+
+@pytest.mark.parametrize(("size", "said"), [(2.5e-6, "0.0025 mm"), (0.02, "0.02 m")])
+def test_small_sizes_are_said_in_thousandths(size, said):
+    found = {"brief_error": entry(size, 0.0) | {"unit": "m", "meaning": "off by {size}"}}
+    found["brief_error"] |= {"ordinary": False}
+    assert imperfection_text(found) == [f"Off by {said}, which is more than usual."]
