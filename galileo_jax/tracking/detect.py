@@ -224,15 +224,15 @@ def _outlined(
                 found[kind].append(_hull(np.concatenate([outline, began])))
     if len(found["left"]) + len(found["reached"]) < LEAST_OUTLINES:
         return began
-    # What nobody follows, as a hand, may be in half of them, and makes these larger; where it held
-    # the thing at first, it is in all that show what has been left.
-    return _small([*found["reached"], *([_small(found["left"])] if found["left"] else [])])
+    # What nobody follows makes some of them larger: a hand that held it, in all that show what has
+    # been left, or a thing that it has met, in those that show where it has come to.
+    return _small([_small(outlines) for outlines in found.values() if outlines], 0.0)
 
 
-def _small(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """Of outlines that which a quarter of them is smaller than."""
+def _small(outlines: Sequence[np.ndarray], share: float = 0.25) -> np.ndarray:
+    """Of outlines that which so many of them are smaller than."""
     areas = [cv2.contourArea(outline.astype(np.float32)) for outline in outlines]
-    return outlines[int(np.argsort(areas)[len(areas) // 4])]
+    return outlines[int(np.argsort(areas)[int(share * len(areas))])]
 
 
 def _medians(places: np.ndarray) -> np.ndarray:
