@@ -86,8 +86,17 @@ def hand_frame(observation: Observation) -> int | None:
     return int(path.frames[starts[is_held][-1] + size]) if is_held.any() else None
 
 
+def goes_up(observation: Observation) -> bool:
+    """Whether object 1 goes up its board first, against `Clip.direction`."""
+    place = observation.path().place_m
+    if not place.size:
+        return False
+    away = place - place[:, :1]
+    return bool(away[0, int(np.argmax(np.hypot(*away[:2])))] < 0)
+
+
 def pushed_frame(observation: Observation, index: int = 0) -> int | None:
-    """The first frame after a push on a level table; None where nothing pushes it at first.
+    """The first frame after a push on the level, or up a board; None where nothing pushes it first.
 
     It gains speed, by `CLEAR` standard deviations of its acceleration in a window and by `HELD` of
     what friction slows it down by, within the first half of its way only: what gains speed for

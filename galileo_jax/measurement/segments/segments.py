@@ -5,7 +5,8 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
 what is no more the object that was marked is `Astray`.
 
     board without a table    from the rest after which it comes down, and from where the hand is
-                             off; to a stop, a blow, or the rest after which it is carried away
+                             off, up the board from where it gains no more speed; to a stop, a blow,
+                             or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
     fall, flight, board      to where the film goes over to slow motion
     fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
@@ -51,6 +52,7 @@ TAKEN = "is taken away by a hand from then on"
 IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
 PUSHED = "is pushed by a hand before that: it gains speed on a level table"
+PUSHED_UP = "is pushed by a hand before that: it gains speed up the board"
 SWINGS = ("pendulum", "spring", "liquid")
 EXPOSED_FRAMES = 1
 """Of a video: the hit falls into an exposure, whose frame shows neither before nor after."""
@@ -153,6 +155,8 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
         return kept.cut("before", handling.thrown_frame(kept.observation, rest_belongs), HELD)
+    if is_let_go and handling.goes_up(kept.observation):
+        return kept.cut("before", handling.pushed_frame(kept.observation), PUSHED_UP)
     return kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_let_go else kept
 
 

@@ -3,7 +3,8 @@
 The tracker drops what does not look like its object (correlation below 0.7), and may go on with
 something that does. So there are three signs, looked for in every object's track:
 
-    leapt   it changes its speed as only a blow could, where nothing is to be hit
+    leapt   it changes its speed as only a blow could, where nothing is to be hit; it is left out
+            from there on
     shared  of pucks seen from above: it is where another one is; at least one of the tracks is
             of something else, and both are left out from there on
     lost    it is not found any more, though it did not leave the picture
@@ -60,16 +61,18 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         seen = np.flatnonzero(observation.mask[i])
         if not seen.size:
             continue
-        frame, last, is_left_out = None, int(seen[-1]), SCENARIOS[clip.scenario].is_level
+        frame, last, is_left_out = None, int(seen[-1]), True
         if (shared := _shared(clip, observation, i)) is not None:
             frame, other = shared
             why = f"it is then in the same place as {other}; both are left out from there on"
         elif (frame := _leapt(clip, observation, i)) is not None:
-            why = "its velocity jumps although it hits nothing: something else is tracked there"
-            if is_left_out:
-                # Where it is lost soon after, what led there was no longer the puck, either.
-                why += ", or the puck was struck by something that is not in the scene"
-                why += "; it is left out from there on"
+            # Where it is lost soon after, what led there was no longer the object, either.
+            why = (
+                "its velocity jumps although it hits nothing: something else is tracked there, or "
+            )
+            why += (
+                "it was struck by something that is not in the scene; it is left out from there on"
+            )
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
             frame, is_left_out = last + 1, False  # nothing follows
             why = "nothing there looks like it; the rest is left out"
@@ -131,8 +134,8 @@ def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
             there, reach_m = place[:, at + 1, None], float(np.hypot(*way))
             may_meet = _may_meet(clip, observation, i, there, seen[at + 1 : at + 2], reach_m)
         if not may_meet:
-            # Of three places that no puck takes one after the other the middle one may be wrong.
-            return int(seen[at + 1 if scenario.is_level else at + 2])
+            # Of three places that nothing takes one after the other the middle one may be wrong.
+            return int(seen[at + 1])
     return None
 
 
