@@ -8,7 +8,12 @@ from scipy.integrate import solve_ivp
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
-from galileo_jax.measurement.segments.handling import let_go_frame, pushed_frame, thrown_frame
+from galileo_jax.measurement.segments.handling import (
+    goes_up,
+    let_go_frame,
+    pushed_frame,
+    thrown_frame,
+)
 from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
@@ -140,6 +145,21 @@ def test_a_push_shows_between_two_rests() -> None:
     found = replace(found, covariance_m2=found.covariance_m2 * smaller)
     first = pushed_frame(found)
     assert first is not None and at_s[1] < times[first] < at_s[1] + 0.2
+
+
+def test_a_push_up_a_board_is_left_out() -> None:
+    """It may last for a third of the way up; then it goes up, and back down, by itself."""
+    times, off_s, push_m_s2, up, down = np.arange(70) / 30, 0.7, 7.0, 5.2, 1.5
+    pushed = np.clip(times - 0.4, 0, off_s - 0.4)
+    speed = push_m_s2 * (off_s - 0.4)
+    rising = np.clip(times - off_s, 0, speed / up)
+    falling = np.clip(times - off_s - speed / up, 0, None)
+    gone = push_m_s2 * pushed**2 / 2 + speed * rising - up * rising**2 / 2 - down * falling**2 / 2
+    way = np.stack([-gone, 0.36 * gone])
+    found = noisy(times, way, noise_m=2e-4)
+    first = pushed_frame(found)
+    assert goes_up(found) and not goes_up(noisy(times, -way, noise_m=2e-4))
+    assert first is not None and off_s - 1e-9 < times[first] < off_s + 0.2
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

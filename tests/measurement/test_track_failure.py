@@ -90,6 +90,7 @@ def test_a_lost_object_is_told_with_its_time(clip: Path, change: Change, why: st
     assert one.name == "object1"
     assert one.time_s == pytest.approx(SWAPPED_FRAME / FPS, abs=1.5 / FPS)
     assert why in one.why
+    assert not found.observation.mask[0, found.observation.times_s > SWAPPED_FRAME / FPS].any()
     (doubt,) = found.doubts
     assert f"object1 is lost from {one.time_s:.2f} s on: {one.why}" in doubt
     assert "see the overlay: galileo track" in doubt
