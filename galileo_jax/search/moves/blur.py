@@ -7,12 +7,11 @@ which at the noise of a search is none: from there the way leads on.
 from galileo_jax.search.table import BASE, Start, Table
 
 NAME = "blur"
-MOST_BLURRED = 6  # those that the loop refines with care
 
 
 def propose(table: Table) -> list[Start]:
     """The hypotheses that may decide and do not explain the data, from their own fits."""
-    keys = [key for key in (BASE, *table.deciding()[:MOST_BLURRED]) if key in table.entries]
+    keys = [key for key in (BASE, *table.deciding()) if key in table.entries]
     rows = [table.entries[key].hypothesis for key in keys]
     wanted = [(one, one.effects) for one in rows if not table.is_explained(one)]
     return [
