@@ -19,6 +19,7 @@ from galileo_jax.runtime.errors import named
 from galileo_jax.table.track_table import TrackTable
 
 WINDOWS, MIN_POINTS = 5, 5
+BACK = 0.1  # of its way: what comes back by less has not turned
 MOST_SHARE = 0.6
 """Of the windows of a path that bend one way; the others are at rest, or hit something."""
 
@@ -58,7 +59,11 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
     seen = np.isfinite(place).all(axis=0)
     t, (x, y) = times[seen], place[:, seen]
     if shows == "drop":
-        value = y[0] - y[-1]
+        top = int(np.argmax(abs(y - y[0])))
+        start, highest, end = place[:, seen][:, [0, top, -1]].T
+        gone, back = highest - start, end - highest
+        # What comes back the way it went was pushed up first.
+        value = gone[1] if (back * gone < -BACK * gone**2).all() else start[1] - end[1]
     elif shows == "sag":
         value = np.polyfit(x - x.mean(), y, 2)[0] if np.ptp(x) > 0 else 0.0
     else:

@@ -25,6 +25,7 @@ NOTHING = frozenset(
 
 PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 COMMA = re.compile(r"[-+]?(\d+,\d+|,\d+)(e[-+]?\d+)?", re.IGNORECASE)
+LARGEST = 1e20  # of a number: as many nanoseconds are 3,000 years
 PLAIN_LETTERS = frozenset("0123456789.+-eE")
 MOST_LOOKED_AT = 500  # rows: a column is of one kind, and printed in one way
 GROUPED = re.compile(r"[-+]?\d{1,3}(?:([,.' ])\d{3})(?:\1\d{3})*(?:([.,])\d*)?")
@@ -155,9 +156,10 @@ def _column(rows: Rows, title: str, at: int, decimal: str, thousands: str | None
             if decimal == ",":
                 cell = cell.replace(",", ".")
         value = float(cell) if PLAIN.fullmatch(cell) else math.inf
-        if not math.isfinite(value):
+        if not abs(value) < LARGEST:
+            why = "is larger than anything" if math.isfinite(value) else "is not a number"
             raise InputError(
-                f"line {line}: {title}: {row[at][:40]!r} is not a number; a number such as "
+                f"line {line}: {title}: {row[at][:40]!r} {why}; a number such as "
                 "0.125 expected; leave the cell empty where nothing was seen"
             )
         values[index], written[index] = value, cell
@@ -179,7 +181,7 @@ def _at_once(cells: list[str]) -> np.ndarray | None:
         values = np.array(cells, dtype=float)
     except ValueError:
         return None
-    return values if np.isfinite(values).all() else None
+    return values if (abs(values) < LARGEST).all() else None
 
 
 def _resolution(cells: list[str], values: np.ndarray) -> float:

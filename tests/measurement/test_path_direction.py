@@ -118,7 +118,7 @@ def test_a_level_table_has_no_angle(tmp_path):
         load_clip(path)
 
 
-@pytest.mark.parametrize("said", ["null", "20", "20\ndirection: left"])
+@pytest.mark.parametrize("said", ["null", "20", "20\ndirection: left", "20\ntrack_y: down"])
 def test_what_is_pushed_up_a_board_tells_where_it_falls(tmp_path, said):
     """Up to the right, and back, in a picture's pixels."""
     angle, start_m_s, px_per_m = math.radians(20), 2.0, 1000
@@ -134,7 +134,7 @@ def test_what_is_pushed_up_a_board_tells_where_it_falls(tmp_path, said):
     (tmp_path / "up.csv").write_text("\n".join(["t,x,y", *rows]) + "\n")
     path = tmp_path / "up.yaml"
     path.write_text(
-        "track: up.csv\ntrack_units: px\ntrack_y: down\nscenario: incline\n"
+        "track: up.csv\ntrack_units: px\nscenario: incline\n"
         f"ramp_angle_deg: {said}\npixels_per_metre: {px_per_m}\n"
         "objects: [{name: object1, shape: box}]\n"
     )

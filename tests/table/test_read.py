@@ -411,6 +411,10 @@ REFUSED = {
         text("t,x", body=lines()),
         r"line 2: 3 cells for 2 titles \('t', 'x'\); give every column a title",
     ),
+    "a_huge_number": (
+        text("t,x,y").replace("0.0805", "8.05e239"),
+        r"line 3: x: '8.05e239' is larger than anything",
+    ),
     "a_word": (text("t,x,y").replace("0.0805", "about"), r"line 3: x: 'about' is not a number"),
     "both_marks": (
         text("t;x;y", body=[*lines(";"), "0,84;1,5;2,5"]),
