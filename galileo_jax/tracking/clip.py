@@ -39,7 +39,7 @@ def track_clip(clip: Clip) -> Track:
     video = clip.video
     if video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
-    sizes = [outline_of(clip, item).size_px for item in clip.objects]
+    sizes = _sizes_px(clip)
     is_told = all(item.point_px is not None for item in clip.objects) and None not in sizes
     passes = 2 if is_told else 3
     total, done = passes * max(clip.frame_count, 1), itertools.count(1)
@@ -112,12 +112,11 @@ def _seen_outline(
 
 def _movers(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) -> list[Mover]:
     """What moves in a film of which a mark or a size is not told; empty where the camera does."""
-    sizes = [outline_of(clip, item).size_px for item in clip.objects]
-    span = max((max(size) for size in sizes if size is not None), default=UNKNOWN_SPAN_PX)
+    sizes = _sizes_px(clip)
     try:
         return find_movers(
             open_frames,
-            span,
+            _span_px(sizes),
             axes_angle_rad=_ramp_angle_rad(clip),
             may_fly=not SCENARIOS[clip.scenario].has_surface,
             outlined=None in sizes,
@@ -134,8 +133,7 @@ def _with_points(clip: Clip, movers: Sequence[Mover], open_frames: OpenFrames) -
     missing = [item for item in clip.objects if item.point_px is None]
     if not missing:
         return clip
-    sizes = [outline_of(clip, item).size_px for item in clip.objects]
-    span = max((max(size) for size in sizes if size is not None), default=UNKNOWN_SPAN_PX)
+    span = _span_px(_sizes_px(clip))
     taken = [item.point_px for item in clip.objects if item.point_px is not None]
     movers = [m for m in movers if all(math.dist(m.point_px, point) > span for point in taken)]
     if len(movers) < len(missing):
@@ -157,6 +155,16 @@ def _with_points(clip: Clip, movers: Sequence[Mover], open_frames: OpenFrames) -
         found[item.name] = marked
     objects = tuple(found.get(item.name, item) for item in clip.objects)
     return clip.model_copy(update={"objects": objects})
+
+
+def _sizes_px(clip: Clip) -> list[Point | None]:
+    """The sizes of the objects in the picture, None where it is not known."""
+    return [outline_of(clip, item).size_px for item in clip.objects]
+
+
+def _span_px(sizes: Sequence[Point | None]) -> float:
+    """About the size of an object: the largest that is known."""
+    return max((max(size) for size in sizes if size is not None), default=UNKNOWN_SPAN_PX)
 
 
 def outline_of(clip: Clip, item: ClipObject) -> Outline:
