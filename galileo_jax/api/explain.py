@@ -168,7 +168,8 @@ def explain(
     Args:
       clips: a film or table of any program, its yaml or a clip; or several, or a folder with them:
         trials of the same objects.
-      out: a folder for the results; None: nothing is written.
+      out: a folder for the results, and for the fit before it is asked what is missing; None:
+        nothing is written.
       scenario: what the clip shows, such as ramp, incline or flight; None: as the path looks.
       ramp_angle: degrees; None: as the path lies, where that shows it.
       pixels_per_metre: of the picture; None: not known.
@@ -207,7 +208,7 @@ def explain(
         progress.report("looking", 0.0)
         with progress.part(0.0, UNDERSTOOD):
             found_clips, _ = answered_clips(sources_of(clips), answers)
-        found = explained(found_clips, engine, seed)
+        found = explained(found_clips, engine, seed, out)
         if out is not None:
             progress.report("writing the page", 0.97)
             found = found.save(out)
@@ -303,8 +304,14 @@ def answered_clips(
     return found, asked
 
 
-def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanation:
-    """The explanation of clips that are checked, or tracked already."""
+def explained(
+    tracks: Sequence[TrackLike], engine: str, seed: int, out: str | Path | None = None
+) -> Explanation:
+    """The explanation of clips that are checked, or tracked already.
+
+    `out`: a folder in which the fit is before it is asked what is missing, for those who stop
+    there; None: nothing is written.
+    """
     with progress.part(UNDERSTOOD, FITTED):
         first = fit_tracks(tracks, engine=engine, seed=seed)
     with progress.part(FITTED, COMPARED):
@@ -319,6 +326,8 @@ def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanatio
             progress.report("what could not have been seen", 0.0)
             found = replace(found, could_not_see=_could_not_see(check, engine, seed))
             return replace(found, gravity=_gravity(first, engine, seed))
+        if out is not None:
+            found.save(out)
         progress.report("asking what is missing", 0.0, found)
         missing = diagnose_fitted(first, engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)

@@ -52,7 +52,8 @@ def main(argv: Sequence[str]) -> None:
             out = out_folder(to, clips)
             warn(warning for clip in clips for warning in clip.warnings)
             with command.progress_display() as display:
-                found = gx.explain(clips, out=out, **how, on_progress=_told(display), cancel=flag)
+                told = _told(display, out)
+                found = gx.explain(clips, out=out, **how, on_progress=told, cancel=flag)
     except (KeyboardInterrupt, Cancelled):
         raise KeyboardInterrupt(_kept(files)) from None
     except Exception as error:
@@ -70,13 +71,16 @@ def main(argv: Sequence[str]) -> None:
         command.say(made.line)
 
 
-def _told(display: progress.OnProgress) -> progress.OnProgress:
-    """Progress, and in words what is known before it is asked what is missing: who stops has it."""
+def _told(display: progress.OnProgress, out: Path) -> progress.OnProgress:
+    """Progress, and in words what is known before it is asked what is missing: who stops has it.
+
+    `out`: where that is written, too.
+    """
 
     def on_progress(stage: str, share_done: float, partial: Any) -> None:
         display(stage, share_done, None)
         if isinstance(partial, gx.Explanation) and share_done < 1:
-            command.say(f"{_filled(f'So far: {partial.paragraph}')}\n")
+            command.say(f"{_filled(f'So far: {partial.paragraph}')}\nkept in {out}\n")
 
     return on_progress
 

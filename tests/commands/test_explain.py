@@ -180,7 +180,8 @@ def test_who_stops_it_while_it_asks_what_is_missing_has_the_fit(tmp_path, monkey
     told, last = err.split("\n\n")
     assert not out and "So far: The block slid with a friction coefficient of " in told
     assert "The data contradict the model (p" in " ".join(told.split())
-    assert last.startswith("stopped; kept: board.yaml")
+    assert told.endswith("kept in runs/board") and last.startswith("stopped; kept: board.yaml")
+    assert {"report.html", "result.json"} <= {one.name for one in Path("runs/board").iterdir()}
 
 
 @pytest.mark.video
