@@ -96,11 +96,11 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
       size: `[point]`, of the trust region: one over the damping.
       is_first: `[point]`, that `there` is no proposal but the start.
       here: the points' costs.
-      there: those of the proposals.
+      there: those of the proposals, where these were before they were bent.
 
     Returns:
-      The next size; `[point]`, whether `there` is accepted; the next proposals
-      `[point, model parameter]`, z; and `[point]`, what these promise to lower the cost by.
+      The next size; `[point]`, whether `there` is accepted; the next steps `[point, model
+      parameter]`, z, straight ahead; and `[point]`, what these promise to lower the cost by.
     """
     import equinox as eqx
     import optimistix as optx  # traced programs are kept: most calls need none of these
@@ -116,7 +116,7 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
         state = descent.query(best.z, _function_info(best), descent.init(best.z, info[0]))
         step, _ = descent.step(size, state)
         promised = -trust.predict_reduction(step, _function_info(best))
-        return size, accepts, best.z + step, promised
+        return size, accepts, step, promised
 
     return jax.vmap(one)(size, is_first, here, there)
 

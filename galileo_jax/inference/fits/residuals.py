@@ -47,6 +47,19 @@ class Slopes(NamedTuple):
     index: Int[np.ndarray, "point free"]
     count: int  # of the models' parameters
 
+    def take(self, rows: Any) -> "Slopes":
+        """Those of the points of an index array."""
+        jacobian, white = ([own[rows] for own in each] for each in (self.jacobian, self.white))
+        return Slopes(jacobian, white, self.index[rows], self.count)
+
+    def put(self, points: np.ndarray, other: "Slopes", rows: np.ndarray) -> None:
+        """Rows of others, which may have been made with fewer columns, in the place of points'."""
+        width = other.index.shape[1]
+        for mine, its in zip(self.jacobian, other.jacobian, strict=True):
+            mine[points, :, :width] = its[rows]
+        for mine, its in zip(self.white, other.white, strict=True):
+            mine[points] = its[rows]
+
     def among_all(self, values: np.ndarray, axis: int = 1) -> np.ndarray:
         """Numbers of free parameters along an axis as numbers of all: 0 of those pinned."""
         shape = [1] * values.ndim
@@ -120,6 +133,13 @@ class Residuals:
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
+
+    def no_slopes(self, free: Bool[np.ndarray, "point parameter"]) -> Slopes:
+        """Of points that are nowhere yet: 0."""
+        index = _free_index(free) if len(free) else np.zeros((0, FREE), int)
+        sizes = [clip.whitening.observed_m.size for clip in self.clips]
+        jacobian = [np.zeros((len(free), size, index.shape[1])) for size in sizes]
+        return Slopes(jacobian, [np.zeros((len(free), size)) for size in sizes], index, self._count)
 
     def _seen_slopes(
         self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]
