@@ -27,18 +27,30 @@ def precision():
 class Banana:
     """Rosenbrock's valley in z1 and z2, and a third parameter of no effect; no rollouts."""
 
+    def __init__(self, steepness: float = 10.0):
+        self.steepness = steepness
+
     def motions(self, points: Batch):
         return [(points.z, points.z, points.z)]
 
     def whites_of(self, points: Batch, motions):
         z = motions[0][0]
-        return [np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)]
+        return [np.stack([self.steepness * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)]
+
+    def whites(self, points: Batch):
+        return self.whites_of(points, self.motions(points))
+
+    def no_slopes(self, free) -> Slopes:
+        count = len(free)
+        index = np.tile(np.arange(3), (count, 1))
+        return Slopes([np.zeros((count, 2, 3))], [np.zeros((count, 2))], index, 3)
 
     def slopes(self, points: Batch, steps: np.ndarray, sides: Sides, motions=None) -> Slopes:
         z = points.z
         [white] = self.whites_of(points, motions or self.motions(points))
         jacobian = np.zeros((len(z), 2, 3))
-        jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 0] = -20 * z[:, 0], 10, -1
+        jacobian[:, 0, 0] = -2 * self.steepness * z[:, 0]
+        jacobian[:, 0, 1], jacobian[:, 1, 0] = self.steepness, -1
         index = np.tile(np.arange(3), (len(white), 1))
         return Slopes([np.where(points.free[:, None], jacobian, 0.0)], [white], index, 3)
 
@@ -71,6 +83,18 @@ def test_every_start_of_a_batch_arrives_at_the_end_of_a_curved_valley():
     np.testing.assert_allclose(found.best.cost, best.cost, atol=1e-8)
     white = Banana().slopes(points, np.ones(3), "ahead").white
     np.testing.assert_allclose(found.first_cost, cost(white, points.z))
+
+
+@pytest.mark.parametrize("steepness", [1e2, 1e4])
+def test_steps_follow_a_valley_that_bends(steepness):
+    """They are few times fewer than those straight ahead, which leave it and are refused."""
+    steps = []
+    for is_smooth in (True, False):
+        descent = Descent(Banana(steepness), np.ones(3), is_smooth, "ahead")  # pyright: ignore
+        found = descent(batch([-1.2, 1.0, 0.5]), 1e-9, 2000)
+        np.testing.assert_allclose(found.best.z[0, 1], found.best.z[0, 0] ** 2, atol=1e-2)
+        steps.append(found.num_steps)
+    assert found.is_settled.all() and steps[0] < 0.6 * steps[1]
 
 
 def test_costs_never_rise_with_more_steps():

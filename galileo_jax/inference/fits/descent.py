@@ -53,7 +53,6 @@ MOST_VALLEYS = 4  # that are polished
 # Both as in the paper: of a step, where its bend is looked for; of twice a bend in lengths of its
 # step, where that is no longer a small part of what is to come.
 AHEAD, MOST_BENT = 0.1, 0.75
-UNDAMPED = 1.0  # size of the trust region: with less, a step was refused
 
 # Of rounds with fitted noise scales.
 MAX_ROUNDS = 6
@@ -228,16 +227,12 @@ class Descent:
                 join(best, give_up.owner, joined)
                 goes_on &= joined == np.arange(count)
             active = active[goes_on[active]]
-            bends[active] = 0.0
-            bent = active[region[active] < UNDAMPED] if self.is_smooth else active[:0]
-            if bent.size:
-                here, steps = (
-                    points.take(bent)._replace(z=best.z[bent]),
-                    proposed[bent] - best.z[bent],
-                )
-                damped = best.normal[bent] + np.eye(size) / region[bent, None, None]
-                bends[bent] = _bends(self.residuals, here, slopes.take(bent), steps, damped)
-                proposed[bent] += bends[bent]
+            if self.is_smooth and active.size:
+                here, steps = points.take(active)._replace(z=best.z[active]), proposed - best.z
+                damped = best.normal[active] + np.eye(size) / region[active, None, None]
+                known = slopes.take(active)
+                bends[active] = _bends(self.residuals, here, known, steps[active], damped)
+                proposed[active] += bends[active]
         is_settled = promised < enough
         return Descended(best, first_cost, widths, is_settled, num_steps, joined)
 
