@@ -64,7 +64,7 @@ def of_two(table: Table) -> Table:
 
 def test_every_file_of_the_folder_is_a_move():
     assert set(MOVES) == {
-        *("add", "blur", "copy_shape", "drop", "jolt", "nudge", "prefix", "scatter", "swap"),
+        *("add", "copy_shape", "drop", "jolt", "nudge", "prefix", "scatter", "swap"),
     }
 
 

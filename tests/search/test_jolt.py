@@ -1,4 +1,4 @@
-"""A fit in a narrow valley is led out of it at more noise than the clip's."""
+"""A fit that has missed its valley is led there across the rims of restitution and gap."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
-from galileo_jax.search.moves import blur
+from galileo_jax.search.moves import jolt
 from galileo_jax.search.table import Entry, Stakes, Table
 from tests.precision import in_64_bit
 
@@ -49,8 +49,5 @@ def test_a_stuck_fit_is_led_to_where_a_start_at_the_truth_goes(tmp_path):
         base = fitter.fit_from(start[None] * none, none[None], np.zeros(1, int))[0]
         table = Table.of(fitter, Stakes(), 0, Hypothesis((), base))
         table = table.with_entry(Entry(Hypothesis(PATCH, stuck), (stuck,)))
-        found = search(table, 1, moves=(blur.propose,)).entries[frozenset(PATCH)].hypothesis.fit
+        found = search(table, 1, moves=(jolt.propose,)).entries[frozenset(PATCH)].hypothesis.fit
         assert found.log_evidence == pytest.approx(right.log_evidence, abs=FOUND_NATS)
-        explained = table.with_entry(Entry(Hypothesis(PATCH, right), (right,)))
-        proposed = blur.propose(explained)
-    assert all(one.effects != PATCH for one in proposed), "what explains the data stays"
