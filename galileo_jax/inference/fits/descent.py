@@ -11,7 +11,7 @@ along it tells the residuals' second derivative r'' in its direction, and it end
 
     a = -1/2 (J^T J + 1 + damping)^-1 J^T r''
 
-beside. From 46 steps along a valley (friction and wheels) it becomes five.
+beside. Forty-four steps along a valley (friction and wheels) become five.
 
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983; M. K.
 Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv 1201.5885.
