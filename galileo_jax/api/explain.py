@@ -25,9 +25,10 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
-from galileo_jax.diagnosis.could_not_see import could_not_see
+from galileo_jax.diagnosis.could_not_see import could_not_see, shown
 from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.diagnosis.stakes import VerdictStakes
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.report.paragraph import paragraph
@@ -52,6 +53,8 @@ class Explanation:
       command: the command that does the same.
       could_not_see: where nothing is missing, of each effect the smallest strength that would have
         shown; as in diagnosis.json, which has it where there is one.
+      in_question: effects that may be missing although the check finds nothing: from the slopes to
+        them they would be worth what imperfections, whose sizes are free, take up in their place.
       gravity: where nothing is missing and nothing carries the objects, the acceleration of free
         fall that the motion itself shows, as an entry of result.json; empty where it shows none.
       files: that were written.
@@ -62,6 +65,7 @@ class Explanation:
     diagnosis: Diagnosis | None
     command: str
     could_not_see: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    in_question: tuple[str, ...] = ()
     gravity: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
 
@@ -85,8 +89,12 @@ class Explanation:
 
     @property
     def check_document(self) -> dict[str, Any]:
-        """compare.json: the check's, and where nothing is missing `could_not_see` and `gravity`."""
-        more = {"could_not_see": self.could_not_see, "gravity": self.gravity}
+        """compare.json: the check's, and where that finds nothing what else is known by now."""
+        more = {
+            "could_not_see": self.could_not_see,
+            "in_question": list(self.in_question),
+            "gravity": self.gravity,
+        }
         return {**self.check.document, **{name: one for name, one in more.items() if one}}
 
     @in_float64
@@ -324,8 +332,11 @@ def explained(
     with progress.part(COMPARED, 0.95):
         if check.is_adequate:
             progress.report("what could not have been seen", 0.0)
-            found = replace(found, could_not_see=_could_not_see(check, engine, seed))
-            return replace(found, gravity=_gravity(first, engine, seed))
+            beside = _beside(check, engine, seed)
+            unseen, in_question = could_not_see(*beside, seed), tuple(shown(*beside, seed))
+            found = replace(found, could_not_see=unseen, in_question=in_question)
+            if not in_question:
+                return replace(found, gravity=_gravity(first, engine, seed))
         if out is not None:
             found.save(out)
         progress.report("asking what is missing", 0.0, found)
@@ -345,8 +356,10 @@ def _gravity(fit: Fit, engine: str, seed: int) -> dict[str, Any]:
     return dict(entry) if entry["identified"] else {}
 
 
-def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[str, Any]]:
-    """Of each effect the smallest strength that would have shown beside a model without any."""
+def _beside(
+    check: Comparison, engine: str, seed: int
+) -> tuple[JointProblem, Hypothesis, dict[str, float]]:
+    """The trials with the library, the fit that describes them, and the effects' log priors."""
     measured, part = check.fit.measurements, check.fit.problem
     whole = with_library([one.clip for one in measured], [o.observation for o in measured], engine)
     whole = whole.with_sizes(part.sizes)
@@ -354,4 +367,4 @@ def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[
     stakes = VerdictStakes(whole, is_adequate=True)
     library = [name for name in whole.all_effects if name not in FORM_NAMES]
     log_priors = {name: stakes.log_prior(Hypothesis((name,), fit)) for name in library}
-    return could_not_see(whole, Hypothesis((), fit), log_priors, seed)
+    return whole, Hypothesis((), fit), log_priors

@@ -20,6 +20,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.special import logsumexp
 
 from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.inference.fits.gradient import GradientFit
@@ -27,9 +28,16 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import force_constants, is_any_weighed
 from galileo_jax.model.parameters import Prior, in_units
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.search.score_tests import shapes_beside, slopes_along, strength_of
+from galileo_jax.search.score_tests import (
+    SHOWS,
+    explained,
+    shapes_beside,
+    slopes_along,
+    strength_of,
+)
 
 ROUNDS = 3  # of slopes: each at the strength that the one before gave
+RATE_Z = 1e-3  # of a strength's prior: a difference over it is a derivative
 PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their prior
 
 
@@ -51,6 +59,50 @@ def could_not_see(
         return {}
     asked = sorted(set(log_priors) - set(last.effects), key=lambda name: (-log_priors[name], name))
     return {name: _entry(own, last, name, log_priors[name], seed) for name in asked}
+
+
+def shown(
+    trials: JointProblem, last: Hypothesis, log_priors: Mapping[str, float], seed: int
+) -> list[str]:
+    """The effects that may be missing beside a model that describes the clips: worth a fit.
+
+    What a free size of imperfections takes up may yet be an effect. From the slopes to it, for each
+    of its shapes, its log odds would be
+
+        -n / 2 log(1 - along^2 / (n |d|^2)) - z^2 / 2 + log sd_z + log prior
+
+    at its best strength, and it is worth a fit where their mean is what the verdict asks for.
+
+    `last`, `log_priors`: as of `could_not_see`.
+    """
+    own = last.of(trials)
+    if own.names != trials.names:
+        return []
+    needed, asked = needed_beside(last.fit), sorted(set(log_priors) - set(last.effects))
+    return [n for n in asked if _log_odds(own, last, n, seed) + log_priors[n] >= needed]
+
+
+def needed_beside(fit: GradientFit) -> float:
+    """The log odds that an effect needs beside a fit that describes the clips."""
+    return CONVINCING if fit.sizes is None else DECISIVE
+
+
+def _log_odds(trials: JointProblem, last: Hypothesis, effect: str, seed: int) -> float:
+    """Of an effect before the data are equal, by slopes at no strength, over all its shapes."""
+    where, size = strength_of(trials, effect)
+    own = trials.model_parameters[where[0]]
+    _, probes = shapes_beside(trials, last.fit, (*last.effects, effect), seed)
+    along, power = slopes_along(trials, last.fit, probes)
+    step = size - own.absent
+    best = own.absent - step * along / np.maximum(power, SHOWS)
+    z = np.asarray(own.prior.inverse(best))
+    is_one = np.isfinite(z) & (power > SHOWS)  # not of the other sign, or where nothing shows
+    z = np.where(is_one, z, 0.0)
+    wide = (in_units(own.prior, z + RATE_Z) - in_units(own.prior, z - RATE_Z)) / (2 * RATE_Z)
+    num_left = max(last.fit.num_values - last.fit.num_used, 1.0)
+    gain = -0.5 * num_left * np.log1p(-np.minimum(explained(along, power) / num_left, 1 - 1e-9))
+    odds = gain - 0.5 * z**2 - 0.5 * np.log1p(power * (wide / step) ** 2)
+    return float(logsumexp(np.where(is_one, odds, -np.inf)) - np.log(len(odds)))
 
 
 def smallest_shown(
@@ -98,7 +150,7 @@ def _smallest(
     own = trials.model_parameters[where[0]]
     probes = probes.copy()
     num_left = max(fit.num_values - fit.num_used, 1.0)
-    needed = CONVINCING if fit.sizes is None else DECISIVE
+    needed = needed_beside(fit)
     found = np.full(len(probes), np.inf)
     for _ in range(ROUNDS):
         _, power = slopes_along(trials, fit, probes)

@@ -161,7 +161,7 @@ def _told(
         name: {
             **summary_of(posterior, values),
             "unit": unit,
-            "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
+            "identified": _is_told(values, before[name][0]),
         }
         for name, (values, unit) in after.items()
     }
@@ -176,6 +176,13 @@ def undetermined_by_mass(trials: JointProblem, forces: Mapping[str, Any]) -> set
     if not is_any_weighed(trials):
         names |= {name for name in trials.names if re.fullmatch(r"m\d+", name)}
     return names
+
+
+def _is_told(after: np.ndarray, before: np.ndarray) -> bool:
+    """Whether draws are much narrower than those of the priors; of what is positive, in ratio."""
+    if before.min() > 0 and after.min() > 0:
+        after, before = np.log(after), np.log(before)
+    return _width(after) < IDENTIFIED_SD_Z * _width(before)
 
 
 def _width(values: np.ndarray) -> float:

@@ -142,6 +142,9 @@ def _verdict(
     p = p_equals(check["p_value"])
     if not check["adequate"]:
         return f"The data contradict the model ({p})."
+    if asked := check.get("in_question"):
+        lacks = listed([_words(name) for name in asked], "or")
+        return f"What it leaves looks like noise ({p}), but {lacks} may be missing."
     text = f"What it leaves looks like noise: nothing is missing ({p})."
     return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
 
@@ -156,7 +159,7 @@ def _gravity(check: Mapping[str, Any]) -> str:
 def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
     """The smallest strengths that would have shown, of the likeliest of all other effects."""
     found = (diagnosis or check).get("could_not_see") or {}
-    asked, in_question = list(found), set()
+    asked, in_question = list(found), set(check.get("in_question", ()))
     if diagnosis is not None:
         in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
         asked = [row["effect"] for row in diagnosis["candidates"]]
