@@ -17,14 +17,21 @@ from galileo_jax.api.diagnose import Diagnosis, diagnose_fitted, with_library
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
-from galileo_jax.api.proposed_clip import clip_of
+from galileo_jax.api.proposed_clip import clip_of, placed
 from galileo_jax.api.track import TrackLike, tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
-from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
+from galileo_jax.clip.load import (
+    FILM_SUFFIXES,
+    YAML_SUFFIXES,
+    find_yaml,
+    has_yaml,
+    load_clip,
+)
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
+from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.diagnosis.could_not_see import could_not_see, shown
 from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.diagnosis.stakes import VerdictStakes
@@ -262,10 +269,20 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
     is_elsewhere = path.is_file() and not has_yaml(path) and source_of(path) is not None
     is_yaml = path.suffix.lower() in YAML_SUFFIXES
     if is_elsewhere or is_declared(path) or (is_yaml and not path.is_file()):
-        if "points" in answers:
-            raise InputError(f"{path}: point (given in the call): its objects are declared already")
-        return load_clip(clip, **answers)
+        return load_clip(clip, **_declared_at(path, answers))
     return understand(path)
+
+
+def _declared_at(path: Path, answers: Mapping[str, Any]) -> dict[str, Any]:
+    """Answers with the objects that a yaml declares where `points`, px, say that they are."""
+    given = dict(answers)
+    points = given.pop("points", None)
+    if points is None:
+        return given
+    if is_track(path):
+        raise InputError(f"{path}: point (given in the call): a table says itself where things are")
+    yaml_path = find_yaml(path)
+    return given | {"objects": placed(read_mapping(yaml_path).get("objects"), points, yaml_path)}
 
 
 def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:

@@ -1,7 +1,7 @@
 """The clip that a file, its yaml and a person's answers make together, and its yaml."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +32,28 @@ def clip_of(known: Understood, answers: Answers, source: str | None = None) -> C
     said = {key: value for key, value in answers.items() if key != "points"}
     if known.declared:
         content = _completed(known, answers) | said
+        if known.has_objects and "points" in answers:
+            objects = placed(known.declared["objects"], answers["points"], known.yaml_path)
+            content["objects"] = objects
     clip = with_unused(check_clip(known.yaml_path, content, overridden=frozenset(said)))
     return clip.model_copy(update={"source": source or str(known.source)})
+
+
+def placed(
+    objects: Any, points: Sequence[tuple[float, float]], yaml_path: Path
+) -> list[dict[str, Any]]:
+    """Objects as a yaml declares them, where points, px, say that they are.
+
+    Raises `InputError` where there are not as many.
+    """
+    known = [one for one in objects if isinstance(one, dict)] if isinstance(objects, list) else []
+    if len(known) != len(points):
+        raise InputError(
+            f"{yaml_path}: objects: {len(known)} declared, but {len(points)} points in the call; "
+            f"delete {yaml_path.name} to be asked anew, or place one: galileo label "
+            f"{yaml_path} --point NAME X Y"
+        )
+    return [{**one, "point_px": list(at)} for one, at in zip(known, points, strict=True)]
 
 
 def _check_slides(known: Understood, answers: Answers) -> None:

@@ -16,7 +16,7 @@ from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import fit_table, notes_on, out_folder, warn
 from galileo_jax.commands.options import VerbParser
 from galileo_jax.commands.stop import stoppable
-from galileo_jax.results.truth import true_parameters
+from galileo_jax.results.truth import hidden_effect, true_parameters
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import Cancelled
@@ -51,6 +51,8 @@ def main(argv: Sequence[str]) -> None:
             clips = _clips(files, said, flag, to)
             out = out_folder(to, clips)
             warn(warning for clip in clips for warning in clip.warnings)
+            truth = true_parameters(clips[0].path)
+            hidden_effect(clips[0].path)  # what is no truth is said before the work
             with command.progress_display() as display:
                 told = _told(display, out)
                 found = gx.explain(clips, out=out, **how, on_progress=told, cancel=flag)
@@ -61,7 +63,7 @@ def main(argv: Sequence[str]) -> None:
             _bundle_failure(files, said, to, words, error)
         raise
     print(_filled(found.paragraph))
-    print(f"\n{fit_table(found.fit, true_parameters(found.fit.measurements[0].clip.path))}")
+    print(f"\n{fit_table(found.fit, truth)}")
     notes_on(found.fit, out)
     command.say(", ".join(map(str, found.files)))
     if is_bundled:

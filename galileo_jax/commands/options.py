@@ -84,6 +84,22 @@ EVERYWHERE: Mapping[str, Mapping[str, Any]] = {
 """What argparse is told of arguments that mean the same in every function."""
 
 
+class _Once(argparse._StoreAction):
+    """Stores a value; refuses another one, of which argparse would take the last."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        if option_string is not None and hasattr(namespace, self.dest):
+            several = "; names are separated by commas" if "," in str(self.metavar) else ""
+            parser.error(f"{option_string}: given twice{several}")
+        super().__call__(parser, namespace, values, option_string)
+
+
 class VerbParser(command.Parser):
     """The parser of `galileo VERB`.
 
@@ -110,6 +126,8 @@ class VerbParser(command.Parser):
             formatter_class=argparse.RawDescriptionHelpFormatter,
             epilog="\n  ".join(("examples:", *examples)),
         )
+        for name in (None, "store"):
+            self.register("action", name, _Once)
         self._function, self._without = function or verb, without
 
     def asked(self, argv: Sequence[str]) -> dict[str, Any]:

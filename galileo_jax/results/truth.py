@@ -40,4 +40,7 @@ def _told(clip: Path, what: str, read: Callable[[Any], Told]) -> Told | None:
     try:
         return read(content)
     except (ValueError, KeyError, TypeError, AttributeError, ZeroDivisionError) as error:
-        raise InputError(f"{path}: not a truth with {what} ({error})") from error
+        raise InputError(
+            f"{path}: not a truth with {what} ({error}), as galileo simulate writes it; "
+            "a file of your own needs another name"
+        ) from error

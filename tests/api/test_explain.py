@@ -4,12 +4,15 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import yaml
 
 import galileo_jax as gx
 from galileo_jax.api import explain as module
 from galileo_jax.api.compare import compare
 from galileo_jax.runtime.errors import InputError
+from tests.api.test_understand import filmed
 
 
 @pytest.fixture(scope="module")
@@ -127,11 +130,62 @@ def test_what_is_no_clip_is_one_line(given, said, tmp_path, monkeypatch):
         gx.explain(given)
 
 
-def test_an_answer_goes_before_the_yaml_but_objects_are_not_declared_twice(board):
+def test_an_answer_goes_before_the_yaml(board):
     clip = module.understood(board, {"ramp_angle_deg": 22.0})
     assert isinstance(clip, gx.Clip) and clip.ramp_angle_deg == 22.0
-    with pytest.raises(InputError, match="declared already"):
+    with pytest.raises(InputError, match="a table says itself where things are"):
         gx.explain(board, point=(10.0, 20.0))
+
+
+@pytest.mark.video
+def test_points_of_a_call_are_where_declared_objects_are(tmp_path):
+    way = 0.09 * np.maximum(np.arange(30.0) - 4, 0) ** 2
+    film = filmed(tmp_path, np.stack([40 + way, 30 + 0.36 * way, 0 * way], axis=1))
+    objects = [{"name": "block", "shape": "box", "point_px": [5, 5], "first_frame": 2}]
+    declared = {"video": film.name, "scenario": "incline", "objects": objects}
+    for more in ({}, {"pixels_per_metre": 300, "ramp_angle_deg": 20}):  # left open, and not
+        film.with_suffix(".yaml").write_text(yaml.safe_dump(declared | more))
+        said = {"ramp_angle_deg": 20.0, "pixels_per_metre": 300.0}
+        (clip,), _ = module.answered_clips([film], {**said, "points": [(41.0, 31.0)]})
+        (block,) = clip.objects
+        assert (block.name, block.point_px, block.first_frame) == ("block", (41.0, 31.0), 2)
+        with pytest.raises(InputError, match=r"1 declared, but 2 points in the call; delete"):
+            module.answered_clips([film], {**said, "points": [(41.0, 31.0), (60.0, 40.0)]})
+
+
+def thrown(path: Path, drag_per_m: float) -> Path:
+    """A table of a throw with a drag that grows with the square of the speed, .25 mm of noise."""
+    step, place, velocity = 1e-4, np.zeros(2), 3.5 * np.array([np.cos(0.75), np.sin(0.75)])
+    rows = []
+    for i in range(7500):
+        if i % 167 == 0:
+            rows.append([i * step, *place])
+        pull = np.array([0.0, -9.81]) - drag_per_m * np.linalg.norm(velocity) * velocity
+        place = place + velocity * step + pull * step**2 / 2
+        velocity = velocity + pull * step
+    table = np.array(rows)
+    table[:, 1:] += np.random.default_rng(4).normal(0, 2.5e-4, (len(table), 2))
+    names = "time_s,object1_x_m,object1_y_m"
+    np.savetxt(path, table, delimiter=",", header=names, comments="", fmt="%.6f")
+    return path
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.15])
+def test_what_imperfections_take_up_is_asked_for(drag, tmp_path):
+    """The size of gusts is free: a throw with drag is one with strong gusts, too, and no worse."""
+    found = gx.explain(thrown(tmp_path / "throw.csv", drag), scenario="flight")
+    assert found.check.is_adequate
+    across = found.fit.parameters["start_velocity_x"]
+    assert abs(across["mean"] - 3.5 * np.cos(0.75)) < 3 * across["sd"]
+    if not drag:
+        assert found.diagnosis is None and "nothing is missing" in found.paragraph
+        return
+    assert "air_drag" in found.in_question
+    before = replace(found, diagnosis=None, fit=found.check.fit).paragraph
+    assert "but air drag" in before and "may be missing" in before
+    assert found.diagnosis is not None and found.diagnosis.verdict.effects == ("air_drag",)
+    told = found.fit.result["derived"]["air_drag_per_mass"]
+    assert told["identified"] and told["q025"] < drag < told["q975"]
 
 
 def test_a_fall_shows_gravity_and_a_slope_does_not(plain, tmp_path):

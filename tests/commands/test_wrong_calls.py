@@ -18,6 +18,8 @@ WRONG = [
     ("fit clip.yaml --seed x", "'x' is not a whole number"),
     ("fit clip.yaml --preset foo", "--preset: invalid choice: 'foo'"),
     ("fit clip.yaml --effects nonsense", "'nonsense'"),
+    ("fit clip.yaml --effects a --effects b", "--effects: given twice; names are separated by c"),
+    ("fit clip.yaml --seed 1 --seed 2", "--seed: given twice"),
     ("fit clip.yaml --thing", "unrecognized arguments: --thing"),
     ("fit clip.yaml --sampler mixture", "--sampler: of --method mh, not of grad"),
     ("fit clip.yaml --method cnn --preset=thesis", "--preset: of --method mh, not of cnn"),

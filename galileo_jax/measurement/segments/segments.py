@@ -40,7 +40,10 @@ from galileo_jax.observation.toss_flight import last_free_frame
 from galileo_jax.tracking.track import Track
 
 STOPPED = "is stopped by something that is not in the scene"
-STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+STRUCK = (
+    "is struck by something that is not in the scene (declare it, if it is a second object): its "
+    "velocity jumps there"
+)
 CHANGES_RATE = (
     "goes on {:.3g} times as fast, its acceleration by the square of that: the frame rate changes "
     "there (slow motion?), which only a cut film or a table with true times can mend"
