@@ -65,10 +65,10 @@ def with_silhouette(
     one, but for what is round, whose middle it becomes. Otherwise it becomes the silhouette's
     middle. If a smooth path leads to that from where the texture was last seen (it was held until
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
-    they are apart is then an unknown shift of the silhouette. Where the two go together, and now
-    nearer, now farther apart, that is an error of the silhouette, too. Of a texture that hardly
-    moves while a silhouette sets out from it, the first frame alone counts: it is of the scene
-    behind.
+    they are apart is then an unknown shift of whichever goes less far. Where the two go together,
+    and now nearer, now farther apart, that is an error of the silhouette, too. Of a texture that
+    hardly moves while a silhouette sets out from it, the first frame alone counts: it is of the
+    scene behind.
     """
     seen = np.isfinite(found.angle_rad)
     if _stays(found, seen):
@@ -97,7 +97,7 @@ def with_silhouette(
         return found
     if not is_fixed and way_px(place[shown]) < way_px(found.position_px[seen]):
         return found
-    kept, slow_px = np.zeros_like(seen), _slow_px(path)
+    kept, slow_px, apart_px = np.zeros_like(seen), _slow_px(path), 0.0
     for run in stretches(seen & ~shown):
         kept[run] = run.stop - run.start >= SAME_FRAMES
     if not is_fixed:
@@ -105,7 +105,7 @@ def with_silhouette(
         last, middle = _led_on(found.position_px, kept, path, size, clock)
         kept[last + 1 :] = False
         if kept.any():
-            slow_px = float(np.hypot(slow_px, ON_OBJECT * size))
+            apart_px = ON_OBJECT * size
         ways = [way_px(one[both]) for one in (place, found.position_px)] if both.any() else [0.0]
         if min(ways) > size > np.ptp(ways):  # they go together, and nobody knows which is off
             slow_px = float(np.hypot(slow_px, 1.4826 * scatter))
@@ -117,7 +117,10 @@ def with_silhouette(
     used = np.isfinite(place[:, 0])
     nothing = np.where(used, 0.0, np.nan)
     shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
-    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
+    ways = [way_px(place[used & each]) if (used & each).any() else 0.0 for each in (kept, ~kept)]
+    is_shifted = kept if ways[0] < ways[1] else ~kept
+    sizes_px = np.hypot(np.where(kept, 0.0, slow_px), np.where(is_shifted, apart_px, 0.0))
+    shifts_px[used, :2] = sizes_px[used, None, None] * np.eye(2)
     none = np.tile(nothing[:, None, None], (1, 2, 2))
     return Finished(place, covariance + none, none, shifts_px, nothing)
 

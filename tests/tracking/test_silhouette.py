@@ -177,15 +177,19 @@ def released(is_led: bool = True) -> tuple[Finished, Path, np.ndarray]:
 
 
 def test_texture_and_silhouette_are_one_path_where_it_leads_from_one_to_the_other():
-    """The frames in which a hand holds it are kept, how far they are apart stays unknown."""
+    """The frames in which a hand holds it are kept, how far they are apart stays unknown.
+
+    That is an error of those in which it hardly moves: in its flight one of 5 px, which lasted for
+    some frames and not for others, would hide the air's drag.
+    """
     found, path, middle = released()
     start = Start("ball", (106.0, 80.0), Outline(None))
     track = with_silhouette(found, start, [path], np.arange(50.0))
     seen = np.isfinite(track.angle_rad)
     assert seen[:28].all() and not seen[28:33].any() and seen[33:].all()
     assert np.abs(track.position_px[seen] - middle[seen]).max() < 2.0
-    assert (track.shifts_px[:28] == 0).all()
-    assert (track.shifts_px[33:, 0, 0] >= ON_OBJECT * 18.0).all()
+    assert (track.shifts_px[:28, 0, 0] >= ON_OBJECT * 18.0).all()
+    assert (track.shifts_px[33:, 0, 0] < 1.0).all()
 
 
 def test_a_silhouette_to_which_no_path_leads_is_followed_alone():
