@@ -135,7 +135,9 @@ def with_coding_errors(clip: Clip, observation: Observation, track: Track) -> Ob
     shifts = np.einsum("ofij,ofpj->opif", slope, track.shifts_px)
     shifts = np.where(observation.mask[:, None, None], shifts, 0.0)
     sd = np.sqrt(np.einsum("oiif->oif", observation.covariance_m2))
-    found = []
+    found = [
+        mode for i in range(len(shifts)) for mode in _shift_of_some(i, observation, track, slope)
+    ]
     for i, own in enumerate(shifts):
         seen = np.flatnonzero(observation.mask[i])
         wander = np.exp(-np.abs(seen[:, None] - seen) / LASTS_FRAMES)
@@ -148,6 +150,22 @@ def with_coding_errors(clip: Clip, observation: Observation, track: Track) -> Ob
                 mode[i][:, seen] = shift / np.where(size > 0, size, 1.0) * pattern
                 found.append(mode)
     return observation.with_modes(errors=found) if found else observation
+
+
+def _shift_of_some(
+    index: int, observation: Observation, track: Track, slope: Float[np.ndarray, "..."]
+) -> list[Float[np.ndarray, "object axis frame"]]:
+    """The error that some of an object's points have in common, against the others."""
+    seen = observation.mask[index]
+    size_px2 = np.where(seen, np.einsum("fii->f", track.common_px2[index]) / 2, 0.0)
+    if not (size_px2 > 0).any() or (size_px2[seen] > 0).all():
+        return []
+    found = []
+    for axis in range(2):
+        mode = np.zeros_like(observation.position_m)
+        mode[index] = np.where(seen, np.sqrt(size_px2) * slope[index, :, :, axis].T, 0.0)
+        found.append(mode)
+    return found
 
 
 def with_camera_modes(clip: Clip, observation: Observation, track: Track) -> Observation:

@@ -119,10 +119,9 @@ def with_silhouette(
     shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
     ways = [way_px(place[used & each]) if (used & each).any() else 0.0 for each in (kept, ~kept)]
     is_shifted = kept if ways[0] < ways[1] else ~kept
-    sizes_px = np.hypot(np.where(kept, 0.0, slow_px), np.where(is_shifted, apart_px, 0.0))
-    shifts_px[used, :2] = sizes_px[used, None, None] * np.eye(2)
-    none = np.tile(nothing[:, None, None], (1, 2, 2))
-    return Finished(place, covariance + none, none, shifts_px, nothing)
+    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
+    common = nothing[:, None, None] + np.multiply.outer(apart_px**2 * is_shifted, np.eye(2))
+    return Finished(place, covariance + common, common, shifts_px, nothing)
 
 
 def _at_the_middle(

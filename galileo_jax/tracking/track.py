@@ -19,8 +19,9 @@ class Track:
     # object's centre when it declares none; NaN where not visible
     position_px: Float[np.ndarray, "object frame 2"]
     covariance_px2: Float[np.ndarray, "object frame 2 2"]  # the error's of each point
-    # how much of that is one error of the object's first frame, which all its
-    # points have in common and which turns with it; 0 where pieces follow each other
+    # how much of that is one error of the object's first frame, which all its points have in common
+    # and which turns with it; 0 where pieces follow each other; if only some have it, a shift of
+    # these against the others
     common_px2: Float[np.ndarray, "object frame 2 2"]
     # errors that follow each other: by how much a coder may shift what moves beside what was taken
     # off; each pattern has a size of its own, about standard normal, that wanders

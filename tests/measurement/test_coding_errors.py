@@ -1,5 +1,6 @@
 """What a coder may shift an object by beside what was taken off is an error that lasts."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +74,20 @@ def test_of_a_lossless_video_nothing_is_left(size: float) -> None:
     clip, track = seen(size * SHIFT[:, None])
     before = observe(clip, track)
     assert with_coding_errors(clip, before, track) is before
+
+
+def test_an_error_that_some_frames_have_in_common_is_one_of_all_these() -> None:
+    clip, track = seen(np.zeros((FRAMES, 1, 2)))
+    is_shifted = np.arange(FRAMES) < FRAMES // 2
+    own = np.multiply.outer(4.0 * is_shifted, np.eye(2))[None]  # 2 px in either axis
+    shifted = replace(track, common_px2=own, covariance_px2=track.covariance_px2 + own)
+    found = with_coding_errors(clip, observe(clip, shifted), shifted)
+    assert found.modes_m is not None and found.num_errors == 2
+    flat = found.modes_m[:, 0].reshape(2, -1)
+    used = np.where(is_shifted & (np.arange(FRAMES) != UNSEEN), 2.0 / SCALE, 0.0)
+    expected = np.kron(np.eye(2), np.multiply.outer(used, used))
+    np.testing.assert_allclose(flat.T @ flat, expected, atol=1e-12)
+    np.testing.assert_allclose(found.covariance_m2, observe(clip, track).covariance_m2)
+    every = np.tile(4.0 * np.eye(2), (1, FRAMES, 1, 1))
+    of_all = replace(track, common_px2=every, covariance_px2=track.covariance_px2 + every)
+    assert with_coding_errors(clip, observe(clip, of_all), of_all).modes_m is None
