@@ -164,11 +164,13 @@ class Diagnosis:
     def best(self) -> Fit:
         """The fit of the last round's model, as `fit` with its effects gives it.
 
-        Where the verdict is unknown: that of the model without effects, with imperfections, as
-        `fit` with `discrepancy="rough"` gives it.
+        Where the verdict is unknown: with imperfections, as `fit` with `discrepancy="rough"` gives
+        it, of the effects that take nearly all of the error away, or else without effects.
         """
         is_unknown, seed = self.verdict.status == "unknown", int(self.document["seed"])
-        chosen = self.found.rounds[0 if is_unknown else -1].hypothesis
+        nearly, chosen = self.found.nearly, self.found.rounds[-1].hypothesis
+        if is_unknown and (nearly is None or nearly.effects != chosen.effects):
+            chosen = self.found.rounds[0].hypothesis
         whole = chosen.of(self.problem)
         effects = whole.problems[0].model.effects
         part = make_joint_problem(

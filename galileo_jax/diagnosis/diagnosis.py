@@ -13,6 +13,7 @@ from scipy.special import softmax
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.each_clip import EachClip
 from galileo_jax.diagnosis.friction_along_way import Stretch
+from galileo_jax.diagnosis.thresholds import DECISIVE, NEARLY_ALL
 from galileo_jax.model.effects.forms import FORM_BY_NAME, FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 
@@ -172,3 +173,11 @@ class Diagnosis:
             return 0.0
         left = max(candidate.error["chi2_per_dof"] - 1.0, 0.0)
         return max(0.0, 1.0 - left / misfit)
+
+    @property
+    def nearly(self) -> Candidate | None:
+        """The most probable candidate, if it takes nearly all of the error away; no formula."""
+        best = self.candidates[0] if self.candidates else None
+        if best is None or best.law is not None or best.log_odds < DECISIVE:
+            return None
+        return best if self.share_explained(best) >= NEARLY_ALL else None

@@ -25,6 +25,8 @@ MOST_LUCK = 4.0
 ROUGH_NATS = 1.0  # by which log odds may be too low, where a hypothesis was refined roughly
 # Log evidence from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
+# Of the squared error beyond noise: what takes so much away is said, though more than noise stays.
+NEARLY_ALL = 0.9
 NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is mentioned
 # The probability from which on it is said that something else may be there beside what is named.
 WORTH_SAYING = 0.1

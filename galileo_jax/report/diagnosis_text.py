@@ -8,7 +8,6 @@ from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
-from galileo_jax.diagnosis.thresholds import DECISIVE
 from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
@@ -19,7 +18,6 @@ from galileo_jax.statespace.terms import ROUGHNESS, TERMS
 
 NO_EFFECTS = "no effects"
 MOST_APART = 2  # that are said one by one
-NEARLY_ALL = 0.9  # of the squared error beyond noise: what does so is worth a sentence
 PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that explains the data
 
 
@@ -94,10 +92,10 @@ def verdict(diagnosis: Diagnosis) -> str:
 
 def _leading(diagnosis: Diagnosis) -> str:
     """Which hypothesis takes nearly all of the error away, though not all; "" where none does."""
-    best = diagnosis.candidates[0] if diagnosis.candidates else None
-    share = diagnosis.share_explained(best)
-    if best is None or best.law is not None or best.log_odds < DECISIVE or share < NEARLY_ALL:
+    best = diagnosis.nearly
+    if best is None:
         return ""
+    share = diagnosis.share_explained(best)
     verb = "takes" if len(best.effects) == 1 else "together take"
     names = " and ".join(best.effects)
     return f"{names} {verb} {100 * min(share, 0.99):.0f} % of the error away, though not all. "

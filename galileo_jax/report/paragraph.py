@@ -47,7 +47,7 @@ def paragraph(
     status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
     model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
     near = ", ".join(nearness(result["error"]))
-    is_one_of_several = status == "ambiguous" and result["effects"]
+    is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [
         _frictions(known, body, shapes),
         *_ratios(known, body),
@@ -57,7 +57,7 @@ def paragraph(
         *(imperfection_text(found) if (found := result.get("imperfections")) else []),
         _verdict(result, check, diagnosis),
         "" if status == "law" else _values(effects),  # the law's text has them
-        f"All values are those with {_all(result)}." if is_one_of_several else "",
+        f"All values are those with {_all(result)}." if is_in_doubt else "",
         _gravity(check),
         _unseen(check, diagnosis),
     ]

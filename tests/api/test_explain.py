@@ -11,6 +11,7 @@ import yaml
 import galileo_jax as gx
 from galileo_jax.api import explain as module
 from galileo_jax.api.compare import compare
+from galileo_jax.diagnosis.verdict import Verdict
 from galileo_jax.runtime.errors import InputError
 from tests.api.test_understand import filmed
 
@@ -186,6 +187,14 @@ def test_what_imperfections_take_up_is_asked_for(drag, tmp_path):
     assert found.diagnosis is not None and found.diagnosis.verdict.effects == ("air_drag",)
     told = found.fit.result["derived"]["air_drag_per_mass"]
     assert told["identified"] and told["q025"] < drag < told["q975"]
+    # Where more than noise is left, what takes nearly all of the error away gives the values, too.
+    unsure = replace(found.diagnosis.found, verdict=Verdict("unknown", ()))
+    best = unsure.candidates[0]
+    for left, effects in ((0.05, ("air_drag",)), (0.2, ())):  # of what is more than noise
+        chi2 = 1 + left * (unsure.base.error["chi2_per_dof"] - 1)
+        doubted = replace(best, error={**best.error, "chi2_per_dof": chi2})
+        of_it = replace(found.diagnosis, found=replace(unsure, candidates=(doubted,)))
+        assert of_it.best.effects == effects
 
 
 def test_a_fall_shows_gravity_and_a_slope_does_not(plain, tmp_path):
