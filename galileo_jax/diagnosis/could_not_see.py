@@ -78,17 +78,22 @@ def shown(
     own = last.of(trials)
     if own.names != trials.names:
         return []
-    needed, asked = needed_beside(last.fit), sorted(set(log_priors) - set(last.effects))
+    needed, asked = _needed_beside(last.fit), sorted(set(log_priors) - set(last.effects))
     return [n for n in asked if _log_odds(own, last, n, seed) + log_priors[n] >= needed]
 
 
-def needed_beside(fit: GradientFit) -> float:
+def _needed_beside(fit: GradientFit) -> float:
     """The log odds that an effect needs beside a fit that describes the clips."""
     return CONVINCING if fit.sizes is None else DECISIVE
 
 
+def _num_left(fit: GradientFit) -> float:
+    """How many residuals tell the noise."""
+    return max(fit.num_values - fit.num_used, 1.0)
+
+
 def _log_odds(trials: JointProblem, last: Hypothesis, effect: str, seed: int) -> float:
-    """Of an effect before the data are equal, by slopes at no strength, over all its shapes."""
+    """Of an effect, its log prior left out, by slopes at no strength: the mean over its shapes."""
     where, size = strength_of(trials, effect)
     own = trials.model_parameters[where[0]]
     _, probes = shapes_beside(trials, last.fit, (*last.effects, effect), seed)
@@ -99,7 +104,7 @@ def _log_odds(trials: JointProblem, last: Hypothesis, effect: str, seed: int) ->
     is_one = np.isfinite(z) & (power > SHOWS)  # not of the other sign, or where nothing shows
     z = np.where(is_one, z, 0.0)
     wide = (in_units(own.prior, z + RATE_Z) - in_units(own.prior, z - RATE_Z)) / (2 * RATE_Z)
-    num_left = max(last.fit.num_values - last.fit.num_used, 1.0)
+    num_left = _num_left(last.fit)
     gain = -0.5 * num_left * np.log1p(-np.minimum(explained(along, power) / num_left, 1 - 1e-9))
     odds = gain - 0.5 * z**2 - 0.5 * np.log1p(power * (wide / step) ** 2)
     return float(logsumexp(np.where(is_one, odds, -np.inf)) - np.log(len(odds)))
@@ -149,8 +154,7 @@ def _smallest(
     """Of each probe (a shape of the effect), by slopes that are taken nearer and nearer to it."""
     own = trials.model_parameters[where[0]]
     probes = probes.copy()
-    num_left = max(fit.num_values - fit.num_used, 1.0)
-    needed = needed_beside(fit)
+    num_left, needed = _num_left(fit), _needed_beside(fit)
     found = np.full(len(probes), np.inf)
     for _ in range(ROUNDS):
         _, power = slopes_along(trials, fit, probes)

@@ -153,9 +153,12 @@ def with_coding_errors(clip: Clip, observation: Observation, track: Track) -> Ob
 
 
 def _shift_of_some(
-    index: int, observation: Observation, track: Track, slope: Float[np.ndarray, "..."]
+    index: int, observation: Observation, track: Track, slope: Float[np.ndarray, "object frame 2 2"]
 ) -> list[Float[np.ndarray, "object axis frame"]]:
-    """The error that some of an object's points have in common, against the others."""
+    """The error that some of an object's points have in common, against the others: x and y of it.
+
+    `slope`: of the picture plane, metres to the pixel.
+    """
     seen = observation.mask[index]
     size_px2 = np.where(seen, np.einsum("fii->f", track.common_px2[index]) / 2, 0.0)
     if not (size_px2 > 0).any() or (size_px2[seen] > 0).all():
