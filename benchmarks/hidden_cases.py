@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORM_NAMES

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import labs, tables
-from galileo_jax.api.diagnose import with_library
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.candidates import candidates_of

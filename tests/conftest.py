@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import gc
+import math
 import os
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from galileo_jax.commands import command
 from galileo_jax.runtime.jax_setup import cache_folder, set_xla_flags
 from tests.missing import find_shared_data, is_missing
 
@@ -22,6 +24,9 @@ if folder := cache_folder():
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     # Small programs too, as under the commands: what one process compiled the others read.
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+
+# A slow command says in a pipe how far it is: whether a machine is that slow is no result.
+command.FIRST_LINE_S = math.inf
 
 # No test depends on time, on how fast the machine is, or on what it compiles on the way.
 settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])

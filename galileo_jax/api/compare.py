@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,14 @@ from galileo_jax.api.fit import EffectsLike
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, load_run
 from galileo_jax.api.track import TrackLike
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.compare import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
+from galileo_jax.diagnosis.could_not_see import unseen
+from galileo_jax.diagnosis.restricted_fit import fit_among
+from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
 from galileo_jax.observation.digest import digest
 from galileo_jax.report.diagnosis_charts import comparison_chart
@@ -28,6 +32,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
+from galileo_jax.search.hypothesis import Hypothesis
 
 FITTED = 0.6  # share of the work, for progress
 
@@ -64,6 +69,23 @@ class Comparison:
     def error(self) -> Mapping[str, float]:
         """`rmse, noise, l1, l2` of velocities, m/s, `chi2_per_dof`, `rms_mm` and its share."""
         return self.found.error
+
+    @property
+    def could_not_see(self) -> Mapping[str, Mapping[str, Any]]:
+        """Of each effect that an adequate model lacks, the smallest strength that would have shown.
+
+        `strength` (None: none that anybody expects would) and `unit`.
+        """
+        return self.document.get("could_not_see", {})
+
+    @property
+    def in_question(self) -> tuple[str, ...]:
+        """Effects that may be missing although the model is adequate.
+
+        From the slopes to them they would be worth what imperfections, whose sizes are free, take
+        up in their place; `diagnose` fits them.
+        """
+        return tuple(self.document.get("in_question", ()))
 
     @property
     def cells(self) -> "pd.DataFrame":
@@ -209,6 +231,7 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
         TRACKS: [digest(problem.observation) for problem in fit.problem.problems],
         "effects": list(fit.problem.all_effects),
         **comparison_document(found),
+        **_unseen(fit, gradient, found, seed),
         "converged": gradient.code in SETTLED,
         "engine": fit.problem.problems[0].engine.name,
         "seconds": round(time.perf_counter() - began, 3),
@@ -218,3 +241,21 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
     made = Comparison(fit, gradient, found, document, command)
     progress.report("compared", 1.0, made)
     return made
+
+
+def _unseen(fit: Fit, gradient: GradientFit, found: Compared, seed: int) -> dict[str, Any]:
+    """What is left open of the library's effects, for compare.json.
+
+    Only of a model that describes the clips, and has nothing that the library has not.
+    """
+    clips, seen = zip(*((one.clip, one.observation) for one in fit.measurements), strict=True)
+    if not found.is_adequate or found.no_verdict is not None:
+        return {}
+    progress.report("what could not have been seen", 0.8)
+    whole = with_library(clips, seen, fit.problem.problems[0].engine.name)
+    whole = whole.with_sizes(fit.problem.sizes)
+    if not set(fit.problem.names) <= set(whole.names):
+        return {}
+    last = Hypothesis(fit.effects, fit_among(gradient, fit.problem, whole))
+    left = unseen(whole, last, VerdictStakes(whole, is_adequate=True).log_priors_beside(last), seed)
+    return {key: value for key, value in asdict(left).items() if value}

@@ -13,8 +13,7 @@ from galileo_jax import __version__
 from galileo_jax.api.fit_result import Fit, Found, make_fit, resolved
 from galileo_jax.api.motion import Motion, motions_at
 from galileo_jax.api.track import TrackLike, as_measurements
-from galileo_jax.assembly.build_problem import make_joint_problem
-from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.assembly.build_problem import make_joint_problem, with_library
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
@@ -30,8 +29,7 @@ from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
-from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
-from galileo_jax.model.effects.registry import effect_names, load_file, make_effects
+from galileo_jax.model.effects.registry import effect_names, load_file
 from galileo_jax.observation.digest import digest
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report import diagnosis_text
@@ -357,30 +355,6 @@ def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnos
     sources = [one.clip.source for one in fit.measurements]
     command = command_line("diagnose", sources, engine=engine, seed=seed or None)
     return _diagnosed(fit.measurements, command, engine, seed, before=fit)
-
-
-def with_library(
-    clips: Sequence[Clip],
-    observations: Sequence[Observation],
-    engine: str,
-    library: Sequence[str] | None = None,
-) -> JointProblem:
-    """The joint problem with all effects and nameless forms that have a place in the scene.
-
-    `library`: names of the effects; None: all that are registered.
-    """
-
-    def problem_with(names: Sequence[str]) -> JointProblem:
-        forms = tuple(form for form in FORMS if form.name in names)
-        effects = make_effects([name for name in names if name not in FORM_NAMES])
-        return make_joint_problem(clips, observations, engine, (*effects, *forms))
-
-    without = SCENARIOS[clips[0].scenario].without
-    effects = effect_names() if library is None else library
-    names = [name for name in (*effects, *FORM_NAMES) if name not in without]
-    problem = problem_with(names)
-    absent = problem.without_place()
-    return problem_with([name for name in names if name not in absent]) if absent else problem
 
 
 def _diagnosed(

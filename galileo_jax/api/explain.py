@@ -13,7 +13,7 @@ import numpy as np
 from galileo_jax.api.bundle import Bundle, bundle_of
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
-from galileo_jax.api.diagnose import Diagnosis, diagnose_fitted, with_library
+from galileo_jax.api.diagnose import Diagnosis, diagnose_fitted
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
@@ -32,21 +32,15 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.diagnosis.could_not_see import could_not_see, shown
-from galileo_jax.diagnosis.restricted_fit import fit_among
-from galileo_jax.diagnosis.stakes import VerdictStakes
-from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.track_cache import is_tracked
-from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.report.paragraph import paragraph
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.search.hypothesis import Hypothesis
 
-UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
+UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.45  # shares of the work, for progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +52,6 @@ class Explanation:
       check: the model without missing effects against the data; `check.fit` is its fit.
       diagnosis: what is missing; None where nothing is, or where the clip cannot tell.
       command: the command that does the same.
-      could_not_see: where nothing is missing, of each effect the smallest strength that would have
-        shown; as in diagnosis.json, which has it where there is one.
-      in_question: effects that may be missing although the check finds nothing: from the slopes to
-        them they would be worth what imperfections, whose sizes are free, take up in their place.
       gravity: where nothing is missing and nothing carries the objects, the acceleration of free
         fall that the motion itself shows, as an entry of result.json; empty where it shows none.
       files: that were written.
@@ -71,8 +61,6 @@ class Explanation:
     check: Comparison
     diagnosis: Diagnosis | None
     command: str
-    could_not_see: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    in_question: tuple[str, ...] = ()
     gravity: Mapping[str, Any] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
 
@@ -96,13 +84,8 @@ class Explanation:
 
     @property
     def check_document(self) -> dict[str, Any]:
-        """compare.json: the check's, and where that finds nothing what else is known by now."""
-        more = {
-            "could_not_see": self.could_not_see,
-            "in_question": list(self.in_question),
-            "gravity": self.gravity,
-        }
-        return {**self.check.document, **{name: one for name, one in more.items() if one}}
+        """compare.json: the check's, and what gravity the motion shows, where it shows any."""
+        return {**self.check.document, **({"gravity": self.gravity} if self.gravity else {})}
 
     @in_float64
     def report(self, path: str | Path, beside: Mapping[str, str] | None = None) -> tuple[Path, ...]:
@@ -347,13 +330,8 @@ def explained(
     if check.found.no_verdict is not None:
         return found
     with progress.part(COMPARED, 0.95):
-        if check.is_adequate:
-            progress.report("what could not have been seen", 0.0)
-            beside = _beside(check, engine, seed)
-            unseen, in_question = could_not_see(*beside, seed), tuple(shown(*beside, seed))
-            found = replace(found, could_not_see=unseen, in_question=in_question)
-            if not in_question:
-                return replace(found, gravity=_gravity(first, engine, seed))
+        if check.is_adequate and not check.in_question:
+            return replace(found, gravity=_gravity(first, engine, seed))
         if out is not None:
             found.save(out)
         progress.report("asking what is missing", 0.0, found)
@@ -371,17 +349,3 @@ def _gravity(fit: Fit, engine: str, seed: int) -> dict[str, Any]:
     free = fit_tracks(tracks_of(fit.measurements), free="gravity", engine=engine, seed=seed)
     entry = free.parameters["gravity"]
     return dict(entry) if entry["identified"] else {}
-
-
-def _beside(
-    check: Comparison, engine: str, seed: int
-) -> tuple[JointProblem, Hypothesis, dict[str, float]]:
-    """The trials with the library, the fit that describes them, and the effects' log priors."""
-    measured, part = check.fit.measurements, check.fit.problem
-    whole = with_library([one.clip for one in measured], [o.observation for o in measured], engine)
-    whole = whole.with_sizes(part.sizes)
-    fit = fit_among(check.gradient, part, whole)
-    stakes = VerdictStakes(whole, is_adequate=True)
-    library = [name for name in whole.all_effects if name not in FORM_NAMES]
-    log_priors = {name: stakes.log_prior(Hypothesis((name,), fit)) for name in library}
-    return whole, Hypothesis((), fit), log_priors

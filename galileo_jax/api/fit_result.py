@@ -329,6 +329,7 @@ def make_fit(
         seed=seed,
         timings_s={key: round(value, 3) for key, value in timings.items()},
         notes={**notes, **inferred(measurements)},
+        num_fitted=gradient.num_fitted if gradient is not None and method == "grad" else None,
     )
     result = with_track_doubts(measurements, result)
     if any(one.clip.is_scale_assumed for one in measurements):

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import __version__
-from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose, with_library
+from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose
 from galileo_jax.api.fit_result import load_run
 from galileo_jax.api.track import Track, tracks_of
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.choose import (
     Expected,

@@ -8,10 +8,12 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.free_quantities import make_free_quantities
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.nuisances import NUISANCES
 from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
+from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.model.model import Model
 from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engines import make_engine
@@ -112,3 +114,27 @@ def make_joint_problem(
         for clip, observation in zip(clips, observations, strict=True)
     ]
     return JointProblem(with_shared_parameters(problems))
+
+
+def with_library(
+    clips: Sequence[Clip],
+    observations: Sequence[Observation],
+    engine: str,
+    library: Sequence[str] | None = None,
+) -> JointProblem:
+    """The joint problem with all effects and nameless forms that have a place in the scene.
+
+    `library`: names of the effects; None: all that are registered.
+    """
+
+    def problem_with(names: Sequence[str]) -> JointProblem:
+        forms = tuple(form for form in FORMS if form.name in names)
+        effects = make_effects([name for name in names if name not in FORM_NAMES])
+        return make_joint_problem(clips, observations, engine, (*effects, *forms))
+
+    without = SCENARIOS[clips[0].scenario].without
+    effects = effect_names() if library is None else library
+    names = [name for name in (*effects, *FORM_NAMES) if name not in without]
+    problem = problem_with(names)
+    absent = problem.without_place()
+    return problem_with([name for name in names if name not in absent]) if absent else problem

@@ -38,12 +38,13 @@ def _lines(compared: "gx.Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
     from galileo_jax.report.diagnosis_text import adequacy
     from galileo_jax.report.fit_text import pull_text
+    from galileo_jax.report.paragraph import unseen_text
 
     names, record = compared.fit.names, compared.document
     several = len(names) > 1
     width = max(len(name) for name in names) + 2 if several else 0
     lines = [
-        adequacy(record),
+        *filter(None, (adequacy(record), unseen_text(record))),
         "",
         f"{'clip' if several else '':<{width}}{'object':<10}{'axis':<6}{'phase':<11}"
         f"{'rmse':>8}{'noise':>8} m/s{'z':>7}",

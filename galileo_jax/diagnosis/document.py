@@ -3,14 +3,14 @@
 The keys are listed in docs/reference/result_files.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from galileo_jax.comparison.compare import comparison_document
-from galileo_jax.diagnosis.could_not_see import could_not_see
+from galileo_jax.diagnosis.could_not_see import unseen
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.friction_along_way import SHOWN, Stretch
@@ -90,8 +90,8 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
-    """See `could_not_see`; beside the last model, where that describes the clips."""
+def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> Mapping[str, Any]:
+    """Beside the last model, where that describes the clips."""
     last = diagnosis.rounds[-1]
     if not last.comparison.is_adequate:
         return {}
@@ -100,7 +100,7 @@ def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dic
         for one in diagnosis.candidates
         if len(one.effects) == 1 and one.law is None and not one.is_form
     }
-    return could_not_see(trials, last.hypothesis, log_priors, seed)
+    return unseen(trials, last.hypothesis, log_priors, seed).could_not_see
 
 
 def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:

@@ -4,7 +4,7 @@ As the rules of `verdict`, most of these need no fit.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb, log
 
 import numpy as np
@@ -38,6 +38,16 @@ class VerdictStakes(Stakes):
         """Log of its probability before the data over that of the model without effects."""
         library = [name for name in self.trials.all_effects if name not in FORM_NAMES]
         return log_prior(odds_of(self.trials, hypothesis), len(library))
+
+    def log_priors_beside(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """Log of the probability with one more effect, before the data, over that without it.
+
+        Of each named effect that a hypothesis does not have.
+        """
+        own = self.log_prior(hypothesis) if hypothesis.effects else 0.0
+        names = set(self.trials.all_effects) - set(hypothesis.effects) - set(FORM_NAMES)
+        larger = {name: replace(hypothesis, effects=(*hypothesis.effects, name)) for name in names}
+        return {name: self.log_prior(one) - own for name, one in larger.items()}
 
     def may_decide(
         self, log_odds: np.ndarray, is_form: np.ndarray, num_effects: np.ndarray

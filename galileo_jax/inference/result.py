@@ -219,11 +219,13 @@ def make_result(
     seed: int,
     timings_s: dict[str, float],
     notes: dict[str, Any],
+    num_fitted: float | None = None,
 ) -> dict[str, Any]:
     """The contract's dictionary.
 
     `z_best`: `[parameter]`, the mode in z, noise scale last; errors are stated at it. `method`:
     "grad", "mh" or "cnn". `notes`: what else the method has to say ("engine", "status", warnings).
+    `num_fitted`: as of `error_of`; None: as the draws have it.
     """
     spread = inverse(trials.parameters, np.asarray(posterior.flat())).std(axis=0)
     table = _entries(trials, posterior, spread)
@@ -240,7 +242,9 @@ def make_result(
     share_from_data = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
     away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
     theta = trials.theta(z_best)
-    num_fitted, pull = float(np.sum(share_from_data[is_fitted])), float(np.sum(away**2))
+    if num_fitted is None:
+        num_fitted = float(np.sum(share_from_data[is_fitted]))
+    pull = float(np.sum(away**2))
     # Nuisances that are far from what is expected, the farthest first.
     pulls = [
         {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}

@@ -26,6 +26,7 @@ from galileo_jax.report.diagnosis_charts import (
     rounds_chart,
 )
 from galileo_jax.report.fit_text import error_text, pull_text
+from galileo_jax.report.paragraph import unseen_text
 from galileo_jax.report.provenance import provenance
 from galileo_jax.results.shown import shown
 
@@ -80,7 +81,8 @@ def write_comparison_page(
         _cells(record["where"], several=len(clips) > 1),
         provenance(command, clips, _engine_and_seed(record)),
     ]
-    more = f"{html.prose(left)}\n{pulls}\n{effects}"
+    unseen = html.prose(unseen, "soft") if (unseen := unseen_text(record)) else ""
+    more = f"{html.prose(left)}\n{pulls}\n{effects}\n{unseen}"
     lead = diagnosis_text.adequacy(record)
     return html.write_page(path, "comparison", title, lead, sections, more, is_adequate)
 

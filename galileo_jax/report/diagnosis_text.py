@@ -40,7 +40,10 @@ def adequacy(record: Mapping[str, Any]) -> str:
     model = f"with {effects_text(record['effects'])} " if record["effects"] else ""
     if not record["adequate"]:
         return f"The model {model}is not adequate: the data contradict it ({equals})."
-    text = f"The model {model}is adequate: its residuals look like noise ({equals})."
+    text = f"The model {model}is adequate: its residuals look like noise ({equals})"
+    if asked := record.get("in_question"):
+        return f"{text}, but {listed(asked, 'or')} may be missing: galileo diagnose tells."
+    text = f"{text}."
     return f"{text} {noise_text(record['noise_scale'])}" if record["noise_misstated"] else text
 
 

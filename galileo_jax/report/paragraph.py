@@ -59,7 +59,7 @@ def paragraph(
         "" if status == "law" else _values(effects),  # the law's text has them
         f"All values are those with {_all(result)}." if is_in_doubt else "",
         _gravity(check),
-        _unseen(check, diagnosis),
+        unseen_text(check, diagnosis),
     ]
     return " ".join(filter(None, said))
 
@@ -156,8 +156,11 @@ def _gravity(check: Mapping[str, Any]) -> str:
     return f"Gravity, measured instead of taken as declared, is {_value(entry)}."
 
 
-def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
-    """The smallest strengths that would have shown, of the likeliest of all other effects."""
+def unseen_text(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None = None) -> str:
+    """The smallest strengths that would have shown, of the likeliest of all other effects.
+
+    Of compare.json, or of diagnosis.json where there is one.
+    """
     found = (diagnosis or check).get("could_not_see") or {}
     asked, in_question = list(found), set(check.get("in_question", ()))
     if diagnosis is not None:

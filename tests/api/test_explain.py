@@ -12,6 +12,7 @@ import galileo_jax as gx
 from galileo_jax.api import explain as module
 from galileo_jax.api.compare import compare
 from galileo_jax.diagnosis.verdict import Verdict
+from galileo_jax.report.diagnosis_text import adequacy
 from galileo_jax.runtime.errors import InputError
 from tests.api.test_understand import filmed
 
@@ -57,8 +58,8 @@ def test_what_could_not_have_been_seen_is_what_a_diagnosis_says(plain):
     assert "could not have been seen" in plain.paragraph
     found = gx.diagnose(plain.fit.measurements[0].clip)
     told = found.document["could_not_see"]
-    assert found.verdict.status == "none" and set(told) == set(plain.could_not_see)
-    for name, one in plain.could_not_see.items():
+    assert found.verdict.status == "none" and set(told) == set(plain.check.could_not_see)
+    for name, one in plain.check.could_not_see.items():
         assert one["unit"] == told[name]["unit"]
         assert (one["strength"] is None) == (told[name]["strength"] is None)
         if one["strength"] is not None:
@@ -181,7 +182,8 @@ def test_what_imperfections_take_up_is_asked_for(drag, tmp_path):
     if not drag:
         assert found.diagnosis is None and "nothing is missing" in found.paragraph
         return
-    assert "air_drag" in found.in_question
+    assert "air_drag" in found.check.in_question
+    assert "but air_drag" in adequacy(found.check.document)
     before = replace(found, diagnosis=None, fit=found.check.fit).paragraph
     assert "but air drag" in before and "may be missing" in before
     assert found.diagnosis is not None and found.diagnosis.verdict.effects == ("air_drag",)

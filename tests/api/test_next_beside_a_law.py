@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
-from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.next_experiment import _read
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.experiment.hypothesis_probabilities import FILE, Belief, Beliefs, write_beliefs
 from galileo_jax.model.effects.registry import effect_names
 

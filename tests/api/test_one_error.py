@@ -23,7 +23,7 @@ HIDDEN = {
     "spring": ("air_drag",),
 }
 NOISES_M = (1e-4, 4e-4)
-SAME = 0.01  # of it: one takes the degrees of freedom from draws, the other from the covariance
+SAME = 1e-6
 
 
 def cases(first, count):

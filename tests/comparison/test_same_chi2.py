@@ -14,7 +14,7 @@ from tests.comparison.test_calibration import disturbed, fit_near_truth
 from tests.oracle_trials import make_trials
 from tests.ramp_model import HIT
 
-SAME = 0.01  # of it: one takes the degrees of freedom from draws, the other from the covariance
+SAME = 1e-6
 
 
 def wrong_model():
@@ -49,6 +49,7 @@ def test_fit_and_compare_say_the_same(make, monkeypatch):
         seed=0,
         timings_s={},
         notes={},
+        num_fitted=fit.num_fitted,
     )["error"]
     for name, value in compared.error.items():
         assert fitted[name] == pytest.approx(value, rel=SAME), name

@@ -1,5 +1,6 @@
 """What a clip could not have shown: strengths by slopes."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,9 +8,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.api.clips import load
-from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
-from galileo_jax.diagnosis.could_not_see import could_not_see, smallest_shown
+from galileo_jax.assembly.build_problem import with_library
+from galileo_jax.diagnosis.could_not_see import smallest_shown, unseen
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.thresholds import CONVINCING
@@ -58,9 +59,9 @@ def made(folder: Path, noise: float) -> JointProblem:
     return with_library([seen.clip], [seen.observation], "rigid", EFFECTS)
 
 
-def seen_in(trials: JointProblem) -> dict:
+def seen_in(trials: JointProblem) -> Mapping:
     base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
-    return could_not_see(trials, base, dict.fromkeys(EFFECTS, -3.0), 0)
+    return unseen(trials, base, dict.fromkeys(EFFECTS, -3.0), 0).could_not_see
 
 
 def test_each_effect_of_the_library_has_a_strength_and_a_unit(tmp_path):
@@ -87,3 +88,16 @@ def test_nothing_is_said_where_the_last_model_does_not_describe_the_clip(
     found = Diagnosis(rounds, candidates, Verdict("none", ()))
     seen = diagnosis_document(trials, found, 0)["could_not_see"]
     assert set(seen) == (set(EFFECTS) if is_said else set())
+
+
+def test_an_effect_that_would_show_is_in_question_where_it_was_hidden(tmp_path):
+    """By slopes alone, beside the fit without it."""
+    for strength, expected in ((0.0, ()), (0.3, ("air_drag",))):
+        path = tmp_path / f"{strength}.csv"
+        hidden = {"air_drag": {"air_drag": strength}} if strength else ()
+        simulate(path, scenario="incline", seed=3, track_only=True, effects=hidden)
+        seen = measure(load(path))
+        trials = with_library([seen.clip], [seen.observation], "rigid", EFFECTS)
+        base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
+        found = unseen(trials, base, dict.fromkeys(EFFECTS, -3.0), 0).in_question
+        assert found[:1] == expected

@@ -5,7 +5,7 @@ import pytest
 
 import galileo_jax as gx
 from galileo_jax.api.clips import load
-from galileo_jax.api.diagnose import with_library
+from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.imperfect_world import imperfect_world
 from galileo_jax.diagnosis.judge import Judge

@@ -2,19 +2,28 @@
 
 import pytest
 
-from tests.docs.console import differences, run, shown_commands
+from tests.docs.console import Shown, differences, run, shown_commands
 from tests.docs.pages import ROOT
 
 TUTORIAL = ROOT / "docs" / "tutorial" / "find_what_is_missing.md"
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("tutorial")
-
-
 SHOWN = shown_commands(TUTORIAL.read_text())
 QUICK = ("simulate", "compare")  # the others follow from them, in this order
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory):
+    """What a command prints after those before it; each is run once."""
+    folder, said = tmp_path_factory.mktemp("tutorial"), dict[str, str]()
+
+    def of(shown: Shown) -> str:
+        for one in SHOWN[: SHOWN.index(shown) + 1]:
+            if one.command not in said:
+                said[one.command] = run(one.command, folder)
+        return said[shown.command]
+
+    return of
 
 
 def test_the_tutorial_shows_the_whole_loop():
@@ -30,8 +39,8 @@ def test_the_tutorial_shows_the_whole_loop():
         for verb in shown.command.split()[1:2]
     ],
 )
-def test_a_command_prints_what_the_tutorial_shows(shown, folder):
-    assert not differences(shown.printed, run(shown.command, folder))
+def test_a_command_prints_what_the_tutorial_shows(shown, printed):
+    assert not differences(shown.printed, printed(shown))
 
 
 class TestDifferences:

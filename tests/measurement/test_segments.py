@@ -121,6 +121,18 @@ def test_a_bounce_between_two_frames_ends_the_flight_before_it(seed):
     assert blow_frame(seen(place, times, 2e-3)) == 22
 
 
+@pytest.mark.parametrize(
+    ("fps", "settles_s"), [(30.0, 0.33), (60.0, 0.4), (120.0, 0.2), (240.0, 0.1)]
+)
+def test_what_soon_goes_steadily_is_not_struck(fps, settles_s):
+    """A ball that sinks, and a puck whose drag ends: most of the way is without acceleration."""
+    times = np.arange(1, int(2.0 * fps)) / fps
+    sinks = 9.81 * settles_s * np.tanh(times / settles_s)
+    slows = 0.05 + 3.0 / (1 + times / settles_s)
+    assert blow_frame(slid(sinks, fps)) is None
+    assert blow_frame(slid(slows, fps)) is None
+
+
 def test_one_bad_point_is_no_blow():
     way = 1.2 * np.arange(1, 240) / 240
     run = slid(way, 240.0)

@@ -41,8 +41,9 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
         |c| > HIT_M_S2 times a step            (no friction, drag or weight accelerates so)
         |c| > SHARE of the speed before        (a bump on the way is none)
         |c| > CLEAR standard deviations of c
-        |c| / d > USUAL times what the run's own accelerations are (three in four are smaller):
-                                               lengths may be in units that nobody knows
+        |c| / d > USUAL times what the run's own accelerations are: those of three in four frames,
+                  and those just before or just after, whichever are less (lengths may be in units
+                  that nobody knows; what sinks in a liquid accelerates in the beginning only)
 
     so that no single point makes a blow. When it was is told by `last_before`.
 
@@ -58,10 +59,15 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     usual, error = _medians(velocity), _medians(sd) / np.sqrt(STEPS)
     middle_s = _medians(path.times_s[:-1] + step_s / 2)
     # From the middle of one window to that of the next which shares no step with it.
-    before, after = slice(None, -(STEPS + SMEARED - 1)), slice(STEPS + SMEARED - 1, None)
+    apart = STEPS + SMEARED - 1
+    before, after = slice(None, -apart), slice(apart, None)
     size = np.linalg.norm(usual[:, after] - usual[:, before], axis=0)
     between_s = middle_s[after] - middle_s[before]
-    steady = np.quantile(size / between_s, 0.75) * between_s
+    own_m_s2 = size / between_s
+    beside = np.pad(own_m_s2, apart, constant_values=np.inf)
+    beside = np.minimum(beside[: -2 * apart], beside[2 * apart :])
+    usual_m_s2 = np.maximum(np.quantile(own_m_s2, 0.75), np.where(beside < np.inf, beside, 0.0))
+    steady = usual_m_s2 * between_s
     speed = np.linalg.norm(usual, axis=0)
     clear = CLEAR * np.hypot(error[after], error[before]) * np.sqrt(np.pi / 2)
     beyond = size - steady

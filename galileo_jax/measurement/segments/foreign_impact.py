@@ -51,18 +51,18 @@ def _soft(clip: Clip, observation: Observation, i: int) -> int | None:
 def _has_partner(clip: Clip, observation: Observation, i: int, frames: slice) -> bool:
     """Whether another puck or a wall is near in some frames, or one may be, unseen.
 
-    It may be so near between two of them, by half of what the puck goes from one to the next.
+    It may be so near between two of them, by half of what both go from one to the next.
     """
     place = observation.position_m[:, :2, frames]
     radii = [(item.size_m or (0.0,))[0] for item in clip.objects]
     own = _on_way(place[i])
     if not np.isfinite(own).all():
         return True
-    reach = NEAR * radii[i] + np.linalg.norm(np.diff(place[i]), axis=0).max() / 2
-    if any(distance_to_segment(own.T, wall.ends_m).min() < reach for wall in clip.walls):
+    reach = NEAR * np.array(radii) + np.linalg.norm(np.diff(place), axis=1).max(axis=1) / 2
+    if any(distance_to_segment(own.T, wall.ends_m).min() < reach[i] for wall in clip.walls):
         return True
     return any(
-        j != i and not np.linalg.norm(_on_way(other) - own, axis=0).min() > reach + NEAR * radii[j]
+        j != i and not np.linalg.norm(_on_way(other) - own, axis=0).min() > reach[i] + reach[j]
         for j, other in enumerate(place)
     )
 

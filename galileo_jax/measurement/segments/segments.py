@@ -172,7 +172,9 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
         poses = read_poses_csv(clip.track, clip.track_up)
         ends.append((last_free_frame(poses, clip.objects[0].size_m), LANDED))
     if is_board or (is_free and clip.scenario == "fall"):
-        ends.append((blow.arrest_frame(observation), STOPPED))
+        stop = blow.arrest_frame(observation)
+        goes_on = stop is not None and blow.goes_on(observation, stop)
+        ends.append((stop, STRUCK if goes_on else STOPPED))
     if is_swing:
         ends.append((rest.standstill_frame(observation), STOPPED))
     if is_board or is_free or is_swing:
@@ -183,8 +185,6 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
     if not found:
         return None, ""
     last, why = min(found)
-    if why == STOPPED and blow.goes_on(observation, last):
-        why = STRUCK
     return last - (EXPOSED_FRAMES if observation.is_tracked_here else 0), why
 
 
