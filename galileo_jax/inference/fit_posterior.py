@@ -21,7 +21,7 @@ from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.log_posterior import LogPosterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status
-from galileo_jax.inference.resampled import resampled
+from galileo_jax.inference.resampled import resampled, truncated, worth
 from galileo_jax.numerics.normal_matrix import symmetric_root
 
 NUM_DRAWS = 4000
@@ -52,17 +52,19 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
     found = weighed(valleys, residuals, seed, density, NUM_AT_ONCE, MOST, ENOUGH)
     num_rollouts = fit.stats.get("num_rollouts", 0) + residuals.num_rollouts
     stats = {**fit.stats, "num_rollouts": num_rollouts}
-    if found.ess < TOO_FEW:
+    log_weights = truncated(found.log_weights)
+    ess = worth(log_weights)
+    if ess < TOO_FEW:
         normal = laplace_posterior(trials, fit, seed)
-        return replace(normal, stats=stats, provenance={**normal.provenance, ESS: found.ess})
-    which = resampled(found.log_weights, NUM_DRAWS, np.random.default_rng([seed, 31]))
+        return replace(normal, stats=stats, provenance={**normal.provenance, ESS: ess})
+    which = resampled(log_weights, NUM_DRAWS, np.random.default_rng([seed, 31]))
     return Posterior(
         names=trials.names,
         draws=trials.theta(found.z[which], fit.free)[None],
         log_density=found.log_density[which][None],
         status=Status.CONVERGED,
         stats=stats,
-        provenance={"method": "grad", "seed": seed, "code": fit.code.name, ESS: found.ess},
+        provenance={"method": "grad", "seed": seed, "code": fit.code.name, ESS: ess},
     )
 
 

@@ -7,14 +7,29 @@ Weights that differ in the tenth digit change no draw, or one. Systematic resamp
 spaced places fall through the sum of all weights before, would choose quite other draws: the ends
 of an interval then differed by .05 standard deviations between two processors.
 
-Source: B. Rosén, On sampling with probability proportional to size, J. Stat. Plan. Inference 62
+Draws that hardly anything proposed weigh so much that one may have most of all weight. They are
+cut, as draws by importance may be: w_i <= mean(w) sqrt(n), which tends to no cut at all.
+
+Sources: E. L. Ionides, Truncated importance sampling, J. Comput. Graph. Stat. 17 (2008), 295 (the
+cut); B. Rosén, On sampling with probability proportional to size, J. Stat. Plan. Inference 62
 (1997), 159 (Pareto sampling, permanent random numbers).
 """
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.special import logsumexp
 
 GOLDEN = (5**0.5 - 1) / 2
+
+
+def truncated(log_weights: Float[np.ndarray, " draw"]) -> Float[np.ndarray, " draw"]:
+    """The same log weights, at most log(mean(w) sqrt(n))."""
+    return np.minimum(log_weights, logsumexp(log_weights) - 0.5 * np.log(len(log_weights)))
+
+
+def worth(log_weights: Float[np.ndarray, " draw"]) -> float:
+    """How many draws of the distribution itself weighed ones are worth: (sum w)^2 / sum w^2."""
+    return float(np.exp(2 * logsumexp(log_weights) - logsumexp(2 * log_weights)))
 
 
 def resampled(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.inference.resampled import resampled
+from galileo_jax.inference.resampled import resampled, truncated, worth
 
 COUNT = 700
 
@@ -60,3 +60,21 @@ def test_the_first_few_are_a_sample_and_hardly_change():
     assert len(set(one) & set(two)) > 0.9 * len(set(one))
     above = own > np.median(own[one])
     assert np.mean(above[resampled(own, COUNT, np.random.default_rng(10))[:100]]) < 0.75
+
+
+def test_no_draw_has_more_than_its_share_of_the_weight():
+    """And where weights are alike, none is cut; what is cut is nothing beside many draws."""
+    size = 400
+    alike = np.random.default_rng(7).normal(0.0, 0.3, size)
+    np.testing.assert_array_equal(truncated(alike), alike)
+    outlier = np.append(np.zeros(size - 1), 30.0) - 1000.0
+    cut = truncated(outlier)
+    assert cut[-1] < outlier[-1] and (cut[:-1] == outlier[:-1]).all()
+    heavy = np.random.default_rng(8).normal(0.0, 3.0, 3000)
+    assert worth(truncated(heavy)) > 3 * worth(heavy)
+
+
+def test_what_weighed_draws_are_worth():
+    assert worth(np.full(50, -1000.0)) == pytest.approx(50)
+    assert worth(np.array([0.0, -np.inf, 0.0])) == pytest.approx(2)
+    assert worth(np.array([0.0, -800.0])) == pytest.approx(1)

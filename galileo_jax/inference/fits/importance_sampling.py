@@ -27,6 +27,7 @@ from galileo_jax.inference.fits.profile_proposal import ridge_along
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.t_proposal import Cloud, Points, Proposal, Values
 from galileo_jax.inference.fits.transport_map import valley_round
+from galileo_jax.inference.resampled import worth
 
 SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
 SHARE_RIDGE = 0.75  # of a valley's draws, where it bends too much
@@ -78,8 +79,7 @@ class WeighedDraws:
         shares = np.bincount(self._of, minlength=len(log_q)) / len(self.z)
         mixture = np.asarray(logsumexp(log_q, axis=0, b=shares[:, None]))
         self.log_weights = self.log_density - mixture
-        weights = np.exp(self.log_weights - self.log_weights.max())
-        self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
+        self.ess = worth(self.log_weights)
 
 
 def weighed(
