@@ -92,7 +92,8 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         return None
     in_pixels = clip.track is None or clip.track_units == "px"
     pixel_m = 1 / clip.pixels_per_metre if clip.pixels_per_metre and in_pixels else 0.0
-    has_origin = not in_pixels or clip.origin_px is not None
+    origin = clip.origin_px if in_pixels else clip.track_origin
+    has_origin = clip.is_own_track or origin is not None
     scenario = SCENARIOS[clip.scenario]
     is_on_ramp = scenario.has_ramp and scenario.angle_deg is None and has_origin
     is_on_ramp &= clip.ramp_angle_deg is not None

@@ -32,6 +32,7 @@ MIN_POINTS = 5  # on a line, or on either side of a bend
 MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
 BEGIN_SHARE, LEAST_BEND = 0.5, 0.01  # of a valley's way; by so many rad its slope changes there
 SIZE_SD_M = 0.003  # a marked point is the centre, and a height right, no better
+SAME_FOOT_SDS = 3.0  # of what a centre and a height are known to: an origin so near is the foot
 NUM_BESIDE = 3  # frames on either side of a hit through which the distance's lines are laid
 
 
@@ -135,24 +136,59 @@ def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
             f"{clip.path}: origin_px: null, and {first.name}'s size_m is null, too; the foot of "
             f"the path shows the ramp only together with its height; {remedy}"
         )
-    points = observation.position_m[0][:, observation.mask[0]]
-    best = two_lines(points, MIN_POINTS)
-    if best is None or not falls_deg(best[0]) - falls_deg(best[1]) >= MIN_BEND_DEG:
+    half_length, half_height = extents(first)
+    found = _bend(observation, half_length)
+    if found is None:
         raise InputError(
             f"{clip.path}: origin_px: null, and {first.name}'s path does not bend: the foot of the "
             f"ramp is not declared; {remedy}"
         )
+    bend, half_angle = found
+    return bend - half_height * np.array([math.tan(half_angle), 1.0])
+
+
+def foot_of_table(clip: Clip, observation: Observation) -> np.ndarray | None:
+    """Where the foot is in a table, `[2]`, m; None where it is the origin, or does not show.
+
+    Whoever measured chose the origin. It may be the foot where the path bends at (h tan(a/2), h),
+    h that of the first object, or any where that is unknown. Else an object without a size is taken
+    to be as high as long: with another h all of the table is higher by as much, and moves alike.
+    """
+    first = clip.objects[0]
+    if first.size_m is None:
+        apart = distance_at_hit(observation, 0) if len(clip.objects) > 1 else None
+        half_length = half_height = max(apart or 0.0, MIN_SIZE_M) / 2
+    else:
+        half_length, half_height = extents(first)
+    found = _bend(observation, half_length)
+    if found is None:
+        return None
+    bend, half_angle = found
+    shift = np.array([math.tan(half_angle), 1.0])
+    height = half_height if first.size_m else float(np.clip(bend[1], 0.0, MAX_SIZE_M / 2))
+    if np.linalg.norm(bend - height * shift) < SAME_FOOT_SDS * SIZE_SD_M:
+        return None
+    return bend - half_height * shift
+
+
+def _bend(observation: Observation, half_length_m: float) -> tuple[np.ndarray, float] | None:
+    """Where the lines of the first path before and after the foot meet, m, and half their angle.
+
+    None where it does not bend, as where it does not reach the table.
+    """
+    points = observation.position_m[0][:, observation.mask[0]]
+    best = two_lines(points, MIN_POINTS)
+    if best is None or not falls_deg(best[0]) - falls_deg(best[1]) >= MIN_BEND_DEG:
+        return None
     before, after, at = best
     # While the object turns its centre leaves both lines: those points are left out.
-    half_length, half_height = extents(first)
     bend = _meeting(before, after)
-    is_far = np.linalg.norm(points - bend[:, None], axis=0) > 1.5 * half_length
+    is_far = np.linalg.norm(points - bend[:, None], axis=0) > 1.5 * half_length_m
     parts = points[:, :at][:, is_far[:at]], points[:, at:][:, is_far[at:]]
     if min(part.shape[1] for part in parts) >= MIN_POINTS:
         before, after = map(line_through, parts)
         bend = _meeting(before, after)
-    half_angle = math.radians(falls_deg(before) - falls_deg(after)) / 2
-    return bend - np.array([half_height * math.tan(half_angle), half_height])
+    return bend, math.radians(falls_deg(before) - falls_deg(after)) / 2
 
 
 def _meeting(before: Line, after: Line) -> np.ndarray:

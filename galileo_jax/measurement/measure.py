@@ -10,7 +10,7 @@ The way of a film, top to bottom:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,13 @@ from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
-from galileo_jax.measurement.infer_ramp import SIZE_SD_M, infer_foot, infer_sizes, infer_slope
+from galileo_jax.measurement.infer_ramp import (
+    SIZE_SD_M,
+    foot_of_table,
+    infer_foot,
+    infer_sizes,
+    infer_slope,
+)
 from galileo_jax.measurement.path_direction import (
     OtherWay,
     other_way,
@@ -142,6 +148,8 @@ def measure(clip: Clip) -> Measurement:
     if is_first_look:
         clip = _inclined(clip, observed(_as_discs(clip))[0])
     whole, pixels = observed(clip)
+    if scenario.has_table and not in_pixels and not clip.is_own_track and clip.track_origin is None:
+        whole = _from_foot(clip, whole, told)
     tracked = whole
     if needs_slope:
         clip = _inclined(clip, whole, told)
@@ -259,6 +267,20 @@ def _with_foot(clip: Clip, told: _Inferring) -> Clip:
         f"{clip.objects[0].name}'s path"
     )
     return clip.model_copy(update={"origin_px": origin})
+
+
+def _from_foot(clip: Clip, whole: Observation, told: _Inferring) -> Observation:
+    """The observation from the foot of its ramp on, where that is not the origin of its table."""
+    foot = foot_of_table(clip, whole)
+    if foot is None:
+        return whole
+    told.inferred["foot_m"] = {"mean": foot.round(4).tolist(), "sd": SIZE_SD_M}
+    told.say(
+        f"track_origin: null, and the path bends elsewhere; the foot of the ramp is taken to be "
+        f"{foot[0]:.3f} m along the travel and {foot[1]:.3f} m above the table's origin "
+        "(`track_origin: [0, 0]` if it is there)"
+    )
+    return replace(whole, position_m=whole.position_m - foot[:, None])
 
 
 def _downhill(clip: Clip, observation: Observation, told: _Inferring) -> Clip:

@@ -88,3 +88,50 @@ def test_what_cannot_be_told_is_one_line(change: dict, words: str, tmp_path: Pat
         measure(clip)
     assert words in str(caught.value)
     assert "galileo label --origin" in str(caught.value)
+
+
+TABLE = """\
+track: slide.csv
+scenario: ramp
+ramp_angle_deg: 20.0
+objects: [{{name: object1, shape: box{size}}}]
+{more}
+"""
+
+
+def in_millimetres(folder: Path, foot_mm: tuple[float, float], y_axis: str) -> Path:
+    """The slide of `write_track` in a table of another program, whose origin is anywhere."""
+    path = write_track(folder)
+    t, x, y = np.loadtxt(folder / "slide.csv", delimiter=",", skiprows=1).T
+    x = 1e3 * (x - FOOT_PX[0]) / SCALE_PX_PER_M + foot_mm[0]
+    y = 1e3 * (FOOT_PX[1] - y) / SCALE_PX_PER_M * (1 if y_axis == "up" else -1) + foot_mm[1]
+    rows = [f"{a:.4f},{b:.2f},{c:.2f}" for a, b, c in zip(t, x, y, strict=True)]
+    (folder / "slide.csv").write_text("\n".join(["t (s),x (mm),y (mm)", *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("y_axis", ["up", "down"])
+@pytest.mark.parametrize("size", ["", ", size_m: [0.06, 0.05, 0.08]"])
+@pytest.mark.parametrize("foot_mm", [(0.0, 0.0), (-300.0, 120.0), (410.0, -75.0)])
+def test_the_origin_of_a_table_may_be_anywhere(foot_mm, size, y_axis, tmp_path: Path) -> None:
+    path = in_millimetres(tmp_path, foot_mm, y_axis)
+    path.write_text(TABLE.format(size=size, more=""))
+    found = measure(load_clip(path))
+    assert ("foot_m" in found.inferred) == (foot_mm != (0.0, 0.0))
+    x, y = found.observation.position_m[0]
+    height_m = (found.clip.objects[0].size_m or (0.0,))[-1] / 2
+    if size:
+        assert height_m == HALF_HEIGHT_M
+    # The bend of the centre's path, wherever the table is.
+    assert np.median(y[x > 0.1]) == pytest.approx(height_m, abs=2e-3)
+    on_ramp = x < -0.1
+    above = y[on_ramp] * np.cos(np.radians(20)) + x[on_ramp] * np.sin(np.radians(20))
+    assert np.median(above) == pytest.approx(height_m, abs=2e-3)
+
+
+def test_a_declared_origin_of_a_table_is_the_foot(tmp_path: Path) -> None:
+    path = in_millimetres(tmp_path, (-300.0, 120.0), "up")
+    path.write_text(TABLE.format(size="", more="track_origin: [0, 0]"))
+    found = measure(load_clip(path))
+    assert "foot_m" not in found.inferred
+    assert found.observation.position_m[0, 0, 0] == pytest.approx(-0.3 - 0.37, abs=0.01)
