@@ -34,6 +34,7 @@ UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
 NUMBERED = re.compile(r"([xyz]|t(?=[_ ]?\d))[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
+AXIS_NUMBERED = re.compile(r"(\D+)(\d+)")
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,10 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
         return Title(WORDS[joined], unit=unit)
     if len(tokens) == 1 and (match := NUMBERED.fullmatch(tokens[0])):
         return Title(WORDS[match[1].lower()], match[2], unit)
+    if len(tokens) == 1 and (match := AXIS_NUMBERED.fullmatch(lower[0])):
+        role = WORDS.get(match[1], "")
+        if role in ("x", "y", "z"):  # 'abscisse1'
+            return Title(role, match[2], unit)
     if DERIVED & set(lower) or (SYMBOLS & set(tokens) and unit not in LENGTHS):
         return Title("", unit=unit)
     if unit is None and len(lower) > 1 and lower[-1] in UNITS and lower[-1] not in WORDS:

@@ -339,5 +339,5 @@ def test_what_stands_off_the_plane_is_warned_of(simulated, tmp_path, capsys):
     content["objects"][1]["z_m"] = 0.01
     (tmp_path / "off.yaml").write_text(yaml.safe_dump(content))
     result = call_fit(tmp_path / "off.yaml", tmp_path / "run")
-    assert result["warnings"] == [OFF_THE_PLANE]
+    assert OFF_THE_PLANE in result["warnings"]
     assert "has a z_m" in " ".join(capsys.readouterr().err.split())

@@ -289,6 +289,7 @@ def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None
     body = [f"{t},{x},{y},{x + 1},{y}" for t, x, y in truth().T]
     for heading in (
         ("t,x1,y1,x2,y2",),
+        ("temps,abscisse1,ordonnée1,abscisse2,ordonnée2",),
         ("Time (s),X A (m),Y A (m),X B (m),Y B (m)",),
         ("t,ball_x,ball_y,box_x,box_y",),
         ("#multi:", ",mass A,,mass B,", "t,x,y,x,y"),
