@@ -35,6 +35,9 @@ ONLY = "object1"  # the name of an object whose columns have none
 UNIX = ((1e11, 1e-3), (1e14, 1e-6), (1e17, 1e-9))
 """From how many on, and what each is in seconds: ms, us and ns since 1970, from 1973 on."""
 
+FILM_MS = tuple(1000 / fps for fps in (24.0, 30.0, 60.0, 120.0, 240.0))
+"""Between two pictures of a film, ms: nobody measures every 33.3 s or 41.7 s."""
+
 MOST_OBJECTS = 50
 
 SAME_CLOCK = 0.01  # of what goes by on one clock: another that is further off is another one
@@ -78,6 +81,8 @@ def _table(columns: Columns) -> TrackTable:
         clock, places, lines = clock[new], places[..., new], [lines[row] for row in new]
         warnings += said
         if not is_in_frames:
+            if _counts_film_ms(columns, columns.of("time")[0]):
+                warnings.append("times without a unit are taken as milliseconds, as of a film")
             if clock.size > 1 and (np.diff(clock) < 0).all():
                 clock, places, lines = clock[::-1] - clock[-1], places[..., ::-1], lines[::-1]
                 warnings.append("the last row comes first: read from the end")
@@ -149,7 +154,18 @@ def _per_unit(columns: Columns, n: int) -> float:
     written, first = columns.meanings[n].unit, columns.numbers[n].values[0]
     if written is not None:
         return SECONDS.get(written, math.nan)
+    if _counts_film_ms(columns, n):
+        return 1e-3
     return next((each for least, each in UNIX[::-1] if first > least), 1.0)
+
+
+def _counts_film_ms(columns: Columns, n: int) -> bool:
+    """Whether times without a unit are those of a film's pictures in milliseconds."""
+    values = columns.numbers[n].values
+    if columns.meanings[n].unit is not None:
+        return False
+    step = abs(float(values[-1] - values[0])) / max(len(values) - 1, 1)
+    return any(abs(step / one - 1) < SAME_CLOCK for one in FILM_MS)
 
 
 def _check_one_clock(columns: Columns) -> None:

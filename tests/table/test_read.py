@@ -300,6 +300,15 @@ def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None
         np.testing.assert_allclose(table.position[1, 0], truth()[1] + 1)
 
 
+@pytest.mark.parametrize(("step", "scale"), [(1000 / 30, 1e-3), (25 / 3, 1e-3), (10.0, 1.0)])
+def test_times_of_a_film_in_milliseconds_need_no_unit(tmp_path: Path, step, scale) -> None:
+    """Ten seconds may be between two rows; a third of a hundred is between two pictures."""
+    body = [f"{n * step:.1f},{0.01 * n:.3f},{1 - 0.001 * n * n:.4f}" for n in range(20)]
+    table = read(tmp_path, text("t,x,y", body=body))
+    np.testing.assert_allclose(table.clock, np.arange(20) * step * scale, rtol=0.01)
+    assert any("milliseconds" in one for one in table.warnings) == (scale != 1.0)
+
+
 def test_an_object_of_one_letter_is_told_from_an_acceleration(tmp_path: Path) -> None:
     body = [f"{t},{x},{y},{x},{y}" for t, x, y in truth().T]
     titles = "t (s),{0} x ({2}),{0} y ({2}),{1} x ({2}),{1} y ({2})"
