@@ -17,19 +17,20 @@ cut); B. Rosén, On sampling with probability proportional to size, J. Stat. Pla
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.special import logsumexp
 
 GOLDEN = (5**0.5 - 1) / 2
 
 
 def truncated(log_weights: Float[np.ndarray, " draw"]) -> Float[np.ndarray, " draw"]:
     """The same log weights, at most log(mean(w) sqrt(n))."""
-    return np.minimum(log_weights, logsumexp(log_weights) - 0.5 * np.log(len(log_weights)))
+    most = float(np.logaddexp.reduce(log_weights)) - 0.5 * np.log(len(log_weights))
+    return np.minimum(log_weights, most)
 
 
 def worth(log_weights: Float[np.ndarray, " draw"]) -> float:
     """How many draws of the distribution itself weighed ones are worth: (sum w)^2 / sum w^2."""
-    return float(np.exp(2 * logsumexp(log_weights) - logsumexp(2 * log_weights)))
+    one, two = (float(np.logaddexp.reduce(power * log_weights)) for power in (1, 2))
+    return float(np.exp(2 * one - two))
 
 
 def resampled(

@@ -5,7 +5,8 @@ Of n rows that follow each other, with p the polynomial through these and n more
     x(t_mean) = mean of (x - p)(t) + p(t_mean),    which is the linear sum of w_i x_i over 3 n rows
 
 so that a curved path is not flattened, and the covariance is that of sum w_i x_i. Rows that p does
-not describe (a hit, a release) stay as they are, as do those next to a gap.
+not describe (a hit, a release) stay as they are, as do those next to a gap, and the first ones: a
+start is inferred for the first row in which something is seen.
 """
 
 import math
@@ -68,12 +69,12 @@ def _weights(
     observation: Observation, size: int
 ) -> tuple[Float[np.ndarray, "row frame"], np.ndarray]:
     """What each new row takes of each frame, and the first frame of each."""
-    count = len(observation.times_s)
+    count, start = len(observation.times_s), int(observation.mask.any(axis=0).argmax())
     single, rows = np.eye(count), []
     for first in range(0, count, size):
         group = slice(first, min(first + size, count))
         around = slice(max(first - size, 0), min(first + 2 * size, count))
-        own = _of_group(observation, group, around)
+        own = None if first <= start else _of_group(observation, group, around)
         if own is None:
             rows += [(i, single[i]) for i in range(group.start, group.stop)]
         else:

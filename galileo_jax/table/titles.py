@@ -89,16 +89,17 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
     joined = "".join(lower).rstrip("#").replace("number", "").replace("index", "")
     if WORDS.get(joined) in ("frame", "object", "time"):
         return Title(WORDS[joined], unit=unit)
-    if len(tokens) == 1 and (match := NUMBERED.fullmatch(tokens[0])):
-        return Title(WORDS[match[1].lower()], match[2], unit)
-    if len(tokens) == 1 and (match := AXIS_NUMBERED.fullmatch(lower[0])):
-        role = WORDS.get(match[1], "")
-        if role in ("x", "y", "z"):  # 'abscisse1'
-            return Title(role, match[2], unit)
     if DERIVED & set(lower) or (SYMBOLS & set(tokens) and unit not in LENGTHS):
         return Title("", unit=unit)
     if unit is None and len(lower) > 1 and lower[-1] in UNITS and lower[-1] not in WORDS:
         tokens, lower, unit = tokens[:-1], lower[:-1], lower[-1]
+    core = [token for token in tokens if token.lower() not in FILLERS]
+    if len(core) == 1 and (match := NUMBERED.fullmatch(core[0])):
+        return Title(WORDS[match[1].lower()], match[2], unit)
+    if len(core) == 1 and (match := AXIS_NUMBERED.fullmatch(core[0].lower())):
+        role = WORDS.get(match[1], "")
+        if role in ("x", "y", "z"):  # 'abscisse1'
+            return Title(role, match[2], unit)
     roles = [WORDS.get(token, "") for token in lower]
     for axis in ("x", "y", "z"):
         exact = [n for n, token in enumerate(lower) if token == axis]

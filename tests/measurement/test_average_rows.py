@@ -47,6 +47,18 @@ def test_nothing_is_lost():
     assert slope_sd(averaged) >= 0.99 * slope_sd(whole), "means tell no more than their rows"
 
 
+def test_the_first_seen_row_stays_at_its_time():
+    """A start is inferred for it: half a group later a pendulum goes at another speed."""
+    times = np.arange(1600) / 60
+    observation = went(swing(times), times)
+    mask = observation.mask.copy()
+    mask[0, :7] = False
+    averaged, _ = with_rows_averaged(replace(observation, mask=mask))
+    first = int(averaged.mask[0].argmax())
+    assert averaged.times_s[first] == times[7]
+    assert averaged.position_m[0, 0, first] == observation.position_m[0, 0, 7]
+
+
 def test_rows_at_a_blow_and_a_gap_stay_as_they_are():
     times = np.arange(1600) / 400
     way = 5 * np.abs(times - 2.0)  # 5 m/s, and back

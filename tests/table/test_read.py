@@ -290,6 +290,7 @@ def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None
     for heading in (
         ("t,x1,y1,x2,y2",),
         ("temps,abscisse1,ordonnée1,abscisse2,ordonnée2",),
+        ("Zeit in s,x1 in m,y1 in m,x2 in m,y2 in m",),
         ("Time (s),X A (m),Y A (m),X B (m),Y B (m)",),
         ("t,ball_x,ball_y,box_x,box_y",),
         ("#multi:", ",mass A,,mass B,", "t,x,y,x,y"),
