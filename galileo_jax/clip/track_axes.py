@@ -64,6 +64,8 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
         gone, back = highest - start, end - highest
         # What comes back the way it went was pushed up first.
         value = gone[1] if (back * gone < -BACK * gone**2).all() else start[1] - end[1]
+    elif shows == "sink":
+        value = y[0] - y[-1]
     elif shows == "sag":
         value = np.polyfit(x - x.mean(), y, 2)[0] if np.ptp(x) > 0 else 0.0
     else:
@@ -158,7 +160,8 @@ def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
     seen = np.isfinite(way)
     scenario = SCENARIOS[file.scenario]
     if scenario.line == "down":
-        sign = -_sign(accelerations(times[seen], way[seen])) if scenario.up_shows else 1
+        is_falling = scenario.up_shows == "bend"
+        sign = -_sign(accelerations(times[seen], way[seen])) if is_falling else 1
         return sign or 1
     gone = way[seen] - way[seen][0]
     has_turned = abs(gone[-1]) < 0.5 * np.abs(gone).max()

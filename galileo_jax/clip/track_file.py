@@ -223,6 +223,11 @@ def _y_axis_of(
     is_level = shows == "drop" and np.nanstd(place[1]) == 0
     if found == usual or (found is None and (falls_aside or is_level)):
         return usual, ()
+    if shows == "sink":
+        raise of.wrong_key(
+            f"track_y: missing; in {of.path.name} it rises if y points {usual}, and sinks if not; "
+            "write track_y: up | down"
+        )
     if found is None:
         raise of.wrong_key(
             f"track_y: missing; {of.path.name} does not state which way its y axis "

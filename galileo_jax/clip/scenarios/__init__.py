@@ -23,8 +23,8 @@ class Scenario:
     moves_in_plane: bool = False
     # the line that the motion is along, or is told by, where one coordinate is enough
     line: Literal["down", "slope", "level", "aside"] | None = None
-    # what of a path tells which way is up: it falls, it hangs, it ends lower
-    up_shows: Literal["bend", "sag", "drop"] | None = None
+    # what of a path tells which way is up: it falls, it hangs, it ends lower, it sinks (or rises)
+    up_shows: Literal["bend", "sag", "drop", "sink"] | None = None
     # names of the laws of motion that are always there (`effects/laws/`)
     laws: tuple[str, ...] = ()
     # effects that have no place: the laws do the same, or the picture cannot tell them from these

@@ -7,6 +7,7 @@ register(
         name="liquid",
         meaning="one object sinks or rises in a liquid",
         line="down",
+        up_shows="sink",
         laws=("liquid", "start_velocity"),
         without=(
             "air_drag",  # liquid_drag
