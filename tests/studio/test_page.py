@@ -73,6 +73,24 @@ def test_a_rectangle_of_known_sides_is_laid_in_place_of_the_stick(browser, folde
         page.wait_for_selector("[data-handle=stick1]")
 
 
+def test_what_is_being_typed_stays_while_another_field_is_taken(browser, folder):
+    yaml = folder / "slide.yaml"
+    scale = read_mapping(yaml)["pixels_per_metre"]
+    width, height = (f"{pixels / scale:.4f}" for pixels in (128, 72))
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        page.click("[data-do=rectangle]")
+        page.wait_for_selector("[data-handle=corner4]")
+        page.locator("[data-side='0']").fill(width)
+        page.keyboard.press("Tab")
+        page.locator("[data-side='1']").fill(height)
+        page.wait_for_timeout(1500)
+        assert page.input_value("[data-side='1']") == height
+        page.keyboard.press("Tab")
+        wait_until(lambda: read_mapping(yaml).get("rectangle") is not None)
+        assert read_mapping(yaml)["rectangle"]["sides_m"] == [float(width), float(height)]
+
+
 def test_the_keyboard_steps_through_frames_and_moves_marks(browser, folder):
     video = folder / "slide.mp4"
     before = point(video)

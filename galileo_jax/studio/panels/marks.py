@@ -38,16 +38,19 @@ def build(tab: Tab) -> None:
     parts.title("Check")
     place = ui.element("div").style("display: contents")
     shown: list[Any] = [None]
+    told: dict[Any, Any] = {}  # what a field was last told: what is being typed into it stays
 
     def refresh() -> None:
         """The rest of the panel stays, so that nothing is swept away while somebody types."""
         sheet = session.sheet
         if sheet is None:
             return
-        for field, value in zip(lengths, _lengths(sheet.marks).values(), strict=True):
-            field.set_value(value)
-        for one in sheet.marks.objects:
-            sizes[one.name].set_value(_text(one.size_m))
+        values = dict(zip(lengths, _lengths(sheet.marks).values(), strict=True))
+        values |= {sizes[one.name]: _text(one.size_m) for one in sheet.marks.objects}
+        for field, value in values.items():
+            if field not in told or told[field] != value:
+                told[field] = value
+                field.set_value(value)
         now = (sheet.remarks, sheet.is_complete, tab.is_idle)
         if now == shown[0]:
             return  # a button that is about to be pressed stays where it is
