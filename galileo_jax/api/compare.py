@@ -248,10 +248,10 @@ def _unseen(fit: Fit, gradient: GradientFit, found: Compared, seed: int) -> dict
 
     Only of a model that describes the clips, and has nothing that the library has not.
     """
-    clips, seen = zip(*((one.clip, one.observation) for one in fit.measurements), strict=True)
     if not found.is_adequate or found.no_verdict is not None:
         return {}
     progress.report("what could not have been seen", 0.8)
+    clips, seen = zip(*((one.clip, one.observation) for one in fit.measurements), strict=True)
     whole = with_library(clips, seen, fit.problem.problems[0].engine.name)
     whole = whole.with_sizes(fit.problem.sizes)
     if not set(fit.problem.names) <= set(whole.names):

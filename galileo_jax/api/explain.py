@@ -75,6 +75,16 @@ class Explanation:
         """What is seen in the first file."""
         return self.looks[0]
 
+    @property
+    def could_not_see(self) -> Mapping[str, Mapping[str, Any]]:
+        """See `Comparison.could_not_see`, of the check."""
+        return self.check.could_not_see
+
+    @property
+    def in_question(self) -> tuple[str, ...]:
+        """See `Comparison.in_question`, of the check."""
+        return self.check.in_question
+
     @cached_property
     def paragraph(self) -> str:
         """The result in the words of a lab report."""

@@ -81,7 +81,8 @@ def write_comparison_page(
         _cells(record["where"], several=len(clips) > 1),
         provenance(command, clips, _engine_and_seed(record)),
     ]
-    unseen = html.prose(unseen, "soft") if (unseen := unseen_text(record)) else ""
+    said = unseen_text(record)
+    unseen = html.prose(said, "soft") if said else ""
     more = f"{html.prose(left)}\n{pulls}\n{effects}\n{unseen}"
     lead = diagnosis_text.adequacy(record)
     return html.write_page(path, "comparison", title, lead, sections, more, is_adequate)

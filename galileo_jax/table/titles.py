@@ -33,8 +33,7 @@ RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
 UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
-NUMBERED = re.compile(r"([xyz]|t(?=[_ ]?\d))[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
-AXIS_NUMBERED = re.compile(r"(\D+)(\d+)")
+NUMBERED = re.compile(r"(\D+)(\d+)|([xyz])([a-z])", re.IGNORECASE)  # 'abscisse1', 'xA'
 
 
 @dataclass(frozen=True)
@@ -95,11 +94,9 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
         tokens, lower, unit = tokens[:-1], lower[:-1], lower[-1]
     core = [token for token in tokens if token.lower() not in FILLERS]
     if len(core) == 1 and (match := NUMBERED.fullmatch(core[0])):
-        return Title(WORDS[match[1].lower()], match[2], unit)
-    if len(core) == 1 and (match := AXIS_NUMBERED.fullmatch(core[0].lower())):
-        role = WORDS.get(match[1], "")
-        if role in ("x", "y", "z"):  # 'abscisse1'
-            return Title(role, match[2], unit)
+        word, name = (match[1] or match[3]).lower(), match[2] or match[4]
+        if word == "t" or WORDS.get(word) in ("x", "y", "z"):
+            return Title(WORDS[word], name, unit)
     roles = [WORDS.get(token, "") for token in lower]
     for axis in ("x", "y", "z"):
         exact = [n for n, token in enumerate(lower) if token == axis]

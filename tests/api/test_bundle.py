@@ -76,7 +76,7 @@ def test_a_bundle_is_fitted_again_to_the_same_numbers(found, board, tmp_path):
     )
     assert "no film, no picture" in made.line
     assert texts["command.txt"] == "galileo explain clip1.csv\n"
-    assert json.loads(texts["compare.json"])["could_not_see"] == found.check.could_not_see != {}
+    assert json.loads(texts["compare.json"])["could_not_see"] == found.could_not_see != {}
     assert set(json.loads(texts["versions.json"])) >= {"galileo_jax", "Python", "jax", "numpy"}
     again = gx.explain(tmp_path / "unpacked" / "clip1.csv")
     told = json.loads(texts["result.json"])

@@ -58,8 +58,8 @@ def test_what_could_not_have_been_seen_is_what_a_diagnosis_says(plain):
     assert "could not have been seen" in plain.paragraph
     found = gx.diagnose(plain.fit.measurements[0].clip)
     told = found.document["could_not_see"]
-    assert found.verdict.status == "none" and set(told) == set(plain.check.could_not_see)
-    for name, one in plain.check.could_not_see.items():
+    assert found.verdict.status == "none" and set(told) == set(plain.could_not_see)
+    for name, one in plain.could_not_see.items():
         assert one["unit"] == told[name]["unit"]
         assert (one["strength"] is None) == (told[name]["strength"] is None)
         if one["strength"] is not None:
@@ -182,7 +182,7 @@ def test_what_imperfections_take_up_is_asked_for(drag, tmp_path):
     if not drag:
         assert found.diagnosis is None and "nothing is missing" in found.paragraph
         return
-    assert "air_drag" in found.check.in_question
+    assert "air_drag" in found.in_question
     assert "but air_drag" in adequacy(found.check.document)
     before = replace(found, diagnosis=None, fit=found.check.fit).paragraph
     assert "but air drag" in before and "may be missing" in before
