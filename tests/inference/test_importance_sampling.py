@@ -85,11 +85,11 @@ CRESCENT: Any = Known(
 TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
 
 
-def weighed(fits, known, seed, num=256, most=1536):
+def weighed(fits, known, seed, num=256, most=1536, enough=ENOUGH_LOOKED):
     def density(z):
         return -known.costs(points(z)) - np.log(2 * np.pi)
 
-    return importance_sampling.weighed(fits, known, seed, density, num, most, ENOUGH_LOOKED)
+    return importance_sampling.weighed(fits, known, seed, density, num, most, enough)
 
 
 def log_mean(found):
@@ -149,6 +149,23 @@ def test_a_cloud_has_the_mean_and_the_covariance_of_what_was_drawn():
     grid[:, [0, 2]] = np.stack([each.ravel() for each in np.meshgrid(axis, axis)], axis=1)
     volume = (axis[1] - axis[0]) ** 2
     assert np.exp(cloud.log_density(grid)).sum() * volume == pytest.approx(1.0, abs=2e-3)
+
+
+def test_a_cloud_changes_smoothly_as_weights_do():
+    """However few draws have all the weight: no table of powers, between which it would jump."""
+    z = np.random.default_rng(4).standard_normal((500, 2))
+    free, uneven = np.ones(2, bool), -np.sum((z - 0.5) ** 2, axis=1)
+    clouds = [Cloud.of(z, power * uneven, free) for power in np.linspace(0.0, 40.0, 4001)]
+    widths = np.array([np.trace(cloud.root) for cloud in clouds])
+    assert np.abs(np.diff(widths)).max() < 0.02 * np.ptp(widths)
+
+
+def test_clouds_are_fitted_seldom(monkeypatch):
+    """Each multiplies what rounding did to the one before: six for sixteen batches."""
+    made, of = [], Cloud.of
+    monkeypatch.setattr(Cloud, "of", lambda *known: made.append(len(known[0])) or of(*known))
+    weighed([BENT.best((0.3, 0.1))], BENT, 0, num=16, most=16 * 16, enough=np.inf)
+    assert made == [16, 32, 48, 80, 128, 192]
 
 
 def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(monkeypatch):

@@ -8,7 +8,9 @@ of a prior, they are not, and with their weights the draws are of the posterior 
 For each valley that was found there is a Student's t along it (`transport_map.py`), so that valleys
 add up and do not count twice where they overlap; one that bends too much for that has a second
 part, which follows its ridge (`profile_proposal.py`). Half of all draws after the first ones are
-from a t that fits those before, a new one every time. Every draw is weighed by all that drew.
+from a t that fits those before, a new one each time that these have grown by half; with one after
+every batch, each multiplied the errors of rounding of the one before several times. Every draw is
+weighed by all that drew.
 
 Source: J. Geweke, Bayesian inference in econometric models using Monte Carlo integration,
 Econometrica 57 (1989), 1317 (the t); A. B. Owen, Monte Carlo theory, methods and examples (2013),
@@ -23,13 +25,15 @@ from jaxtyping import Bool, Float
 from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.profile_proposal import ridge_along
+from galileo_jax.inference.fits.profile_proposal import BENT, ridge_along
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.t_proposal import Cloud, Points, Proposal, Values
 from galileo_jax.inference.fits.transport_map import valley_round
 from galileo_jax.inference.resampled import worth
 
 SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
+GROWN = 1.5  # so many draws as a t fits, and there is a new one
+FOLDED = 10 * BENT  # so much bent, a map leads nowhere, and changes with every digit of the fit
 SHARE_RIDGE = 0.75  # of a valley's draws, where it bends too much
 
 
@@ -52,14 +56,17 @@ class WeighedDraws:
         """`shares`: of the first draws; `free`: the parameters that are drawn."""
         self._proposals, self._shares, self._free = list(proposals), shares, free
         self.z, self.log_weights, self.ess = np.empty((0, len(free))), np.empty(0), 0.0
+        self._num_fitted = 0  # draws, by the last t
         self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
 
     def draw(self, generator: np.random.Generator, num: int) -> Points:
         """Further draws."""
         which, shares = np.arange(len(self._shares)), self._shares
-        if self.log_density.size:
-            which = np.append(which, len(self._proposals))
-            self._proposals.append(Cloud.of(self.z, self.log_weights, self._free))
+        if len(self.z):
+            if len(self.z) >= GROWN * self._num_fitted:
+                self._proposals.append(Cloud.of(self.z, self.log_weights, self._free))
+                self._num_fitted = len(self.z)
+            which = np.append(which, len(self._proposals) - 1)
             shares = np.append((1 - SHARE_ADAPTED) * shares, SHARE_ADAPTED)
         counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
         each = zip(which, counts, strict=True)
@@ -109,6 +116,8 @@ def weighed(
         shares.append(1 / len(fits))
         ridge = ridge_along(fit, valley, residuals)
         if ridge is not None:
+            if np.abs(valley.quadratic).max() > FOLDED:
+                proposals[-1] = valley.unbent
             proposals.append(ridge)
             shares[-1:] = [(1 - SHARE_RIDGE) * shares[-1], SHARE_RIDGE * shares[-1]]
     made = WeighedDraws(proposals, np.array(shares), fits[0].free)

@@ -9,13 +9,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.special import gammaln
+from scipy.special import gammaln, softmax
 
+from galileo_jax.inference.resampled import worth
 from galileo_jax.numerics.normal_matrix import symmetric_root
 
 FREEDOM = 5.0  # degrees of it, of Student's t
-POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count
-DRAWS_PER_PARAMETER = 4.0
+DRAWS_PER_PARAMETER = 4.0  # that weights must be worth, or they are flattened
 LEAST_VARIANCE = 1e-10  # in z, of a direction in which draws do not differ
 
 Points = Float[np.ndarray, "draw parameter"]
@@ -49,11 +49,8 @@ class Cloud:
     def of(cls, z: Points, log_weights: Values, free: Bool[np.ndarray, " parameter"]) -> "Cloud":
         """The t with mean and covariance of draws, their weights flattened till enough count."""
         own = z[:, free]
-        for power in POWERS:
-            weights = np.exp(power * (log_weights - log_weights.max()))
-            weights /= weights.sum()
-            if 1 / np.sum(weights**2) > DRAWS_PER_PARAMETER * own.shape[1]:
-                break
+        power = _flattened(log_weights, DRAWS_PER_PARAMETER * own.shape[1])
+        weights = softmax(power * log_weights)
         mean = weights @ own
         far = own - mean
         return cls(mean, symmetric_root((weights * far.T) @ far, LEAST_VARIANCE), free)
@@ -69,6 +66,21 @@ class Cloud:
         """Of the free parameters."""
         u = np.linalg.solve(self.root, (z[:, self.free] - self.mean).T).T
         return log_student_t(u, self.freedom) - np.linalg.slogdet(self.root)[1]
+
+
+def _flattened(log_weights: Values, enough: float) -> float:
+    """The power of the weights, at most 1, by which they are worth so many draws.
+
+    0 where there are no more.
+    """
+    if worth(log_weights) >= enough:
+        return 1.0
+    if len(log_weights) <= enough:
+        return 0.0
+    from scipy.optimize import root_scalar  # most draws never come here
+
+    found = root_scalar(lambda power: worth(power * log_weights) - enough, bracket=(0.0, 1.0))
+    return float(found.root)
 
 
 def log_student_t(u: Points, freedom: float = FREEDOM) -> Values:

@@ -27,7 +27,7 @@ M. D. Parno, Y. M. Marzouk, Transport map accelerated Markov chain Monte Carlo, 
 Uncertain. Quantif. 6 (2018), 10.1137/17M1134640.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
@@ -57,6 +57,11 @@ class Valley:
         """From w to z, `[..., parameter]`; in NumPy or JAX, whichever w is of."""
         u = w @ self.axes
         return self.mode + (u + u**2 @ self.quadratic.T + u**3 @ self.cubic.T) @ self.root.T
+
+    @property
+    def unbent(self) -> "Valley":
+        """The same with B and C 0."""
+        return replace(self, quadratic=0 * self.quadratic, cubic=0 * self.cubic)
 
     def along(self, z: Points) -> np.ndarray:
         """R^-1 (z - mode), `[point, direction]`: standard deviations along each direction."""
