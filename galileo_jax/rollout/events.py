@@ -206,7 +206,8 @@ def newton(
     """Where a level falls through zero, and what is left of it one step before; not below 0.
 
     Safeguarded by bisection, from a first guess on. Beyond `most`, the last time at which the level
-    may be asked for, where it does so there only.
+    may be asked for, where it does so there only. The derivative of the instant is -d level / rate
+    in any case: where bounds are a rounding apart, the last step may be one of bisection.
 
     `level`: a time to levels `[...]`, above zero before, and how fast they rise.
     """
@@ -214,12 +215,14 @@ def newton(
     def nearer(at: jax.Array, low: jax.Array, high: jax.Array) -> tuple[jax.Array, ...]:
         at = jax.lax.stop_gradient(jnp.clip(at, 0.0, most))
         left, rate = level(at)
-        rate = jax.lax.stop_gradient(rate)
+        falls = rate < 0
+        step = -left / jax.lax.stop_gradient(jnp.where(falls, rate, -1.0))
         low = jnp.where(left > 0, at, low)
         high = jnp.where(left > 0, high, at)
-        new = at - left / jnp.where(rate < 0, rate, -1.0)
-        is_inside = (rate < 0) & (new >= low) & (new <= high)
-        return jnp.where(is_inside, new, 0.5 * (low + high)), low, high, left
+        new = at + step
+        is_inside = falls & (new >= low) & (new <= high)
+        new = jax.lax.stop_gradient(jnp.where(is_inside, new, 0.5 * (low + high)))
+        return new + jnp.where(falls, step - jax.lax.stop_gradient(step), 0.0), low, high, left
 
     def early(_: Any, carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
         return jax.lax.stop_gradient(nearer(*carry)[:3])
