@@ -152,7 +152,8 @@ def along_line(
         sign = 1 if file.track_y == "up" else -1
     else:
         sign = sign_along(file, times, way_m[0])
-    return line_observation(file, of.names, times, sign * way_m, sd_m)
+    on_line = line_observation(file, of.names, times, sign * way_m, sd_m)
+    return replace(on_line, rows_of_noise=len(times))
 
 
 def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
@@ -209,7 +210,8 @@ def swung(of: DeclaredTrack, times: np.ndarray, angle_rad: np.ndarray) -> Observ
         sd = np.array([told_noise_m(name, times, thread_m * one)
                        for name, one in zip(of.names, angle_rad, strict=True)])  # fmt: skip
     covariance = sd[:, None, None, None] ** 2 * np.eye(2)[:, :, None]
-    return observed_where_finite(of.names, times, place, covariance)
+    on_circle = observed_where_finite(of.names, times, place, covariance)
+    return replace(on_circle, rows_of_noise=len(times))
 
 
 def check_falls_down(of: DeclaredTrack, observation: Observation) -> None:

@@ -20,6 +20,7 @@ import difflib
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,9 @@ def _observation(path: Path) -> Observation:
         covariance.append(of(name, column, times, place, lines))
         position.append(place)
     place, error = np.array(position), np.array(covariance)
-    return observed_where_finite(names, times, place, error, is_turning)
+    seen = observed_where_finite(names, times, place, error, is_turning)
+    is_stated = not {"sd_m", "sd_x_m"}.isdisjoint(first)
+    return seen if is_stated else replace(seen, rows_of_noise=len(times))
 
 
 def write_observation_csv(path: Path, observation: Observation) -> None:

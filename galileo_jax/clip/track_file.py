@@ -333,4 +333,5 @@ def _observation(
             check_speed(name, times, place)
         rough = roughness_covariance_m2(name, times, place)
         covariance.append(np.maximum(rough, rounding[:, :, None]))
-    return observed_where_finite(names, times, position, np.array(covariance))
+    seen = observed_where_finite(names, times, position, np.array(covariance))
+    return replace(seen, rows_of_noise=len(times))

@@ -3,14 +3,17 @@
     1. From the fit, draw data: the predicted positions, and errors from the covariance with
        which they were fitted, the modes as large as they are in the data (the likelihood allows
        for imperfections that a good clip need not have); and draw the prior's centre, which is
-       data, too. How large a tracker's errors are is known to some per cent only: in each stretch
-       of a motion they are larger or smaller than stated (`Observation.noise_known_to`).
+       data, too. How large errors are is known to some per cent only: those of our tracker are
+       larger or smaller than stated in each stretch of a motion (`Observation.noise_known_to`),
+       and those that n rows tell by their roughness (`rows_of_noise`) in each coordinate: the
+       logarithm of such a variance has the standard deviation `ROUGH` / sqrt(n).
     2. Refit each replicate: Gauss-Newton steps with the fit's Jacobian, each checked with true
        rollouts, so that no residual is taken from a linear model.
 
 Rollouts of all replicates are one batch.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -24,6 +27,7 @@ from galileo_jax.similarity.gaussian_likelihood import is_measured
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
+ROUGH = 3.0  # of `track_noise.position_noise_m`, where errors are independent and normal
 
 
 def replicates(
@@ -109,8 +113,9 @@ def _errors(
     data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.rows
     found = generator.standard_normal((count, problem.observation.position_m.size))
-    if problem.observation.noise_known_to:
-        found = found * _uneven(problem.observation, label, count, generator)
+    seen = problem.observation
+    if seen.noise_known_to or seen.rows_of_noise:
+        found = found * _uneven(seen, label, count, generator)
     # Drawn as values and seen along the modes: these are unit normals, too, and the replicates do
     # not depend on the modes' signs, which rounding decides.
     along = generator.standard_normal(found.shape) @ basis.T
@@ -127,8 +132,10 @@ def _errors(
 def _uneven(
     observation: Observation, label: np.ndarray, count: int, generator: np.random.Generator
 ) -> np.ndarray:
-    """How large errors are over stated errors, `[replicate, value]`: of each stretch another."""
+    """How large errors are over stated errors, `[replicate, value]`."""
     known_to, (objects, axes, frames) = observation.noise_known_to, observation.position_m.shape
+    if rows := observation.rows_of_noise:
+        known_to, label = ROUGH / math.sqrt(rows), np.zeros_like(label)
     log_variance = known_to * generator.standard_normal((count, objects, axes, label.max() + 1))
     each = np.exp((log_variance - known_to**2 / 2) / 2)  # of a mean square of 1
     index = np.broadcast_to(label[:, None], (count, objects, axes, frames))

@@ -8,7 +8,7 @@ path is then the way along the declared line.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,7 +107,8 @@ def turned_back(clip: Clip, observation: Observation, way: OtherWay) -> Observat
     gone = np.einsum("a,oat->ot", along, observation.position_m)
     sd_m = np.sqrt(np.einsum("a,b,oabt->ot", along, along, observation.covariance_m2))
     sign = sign_along(clip, observation.times_s, gone[0])
-    return line_observation(clip, observation.names, observation.times_s, sign * gone, sd_m)
+    on_line = line_observation(clip, observation.names, observation.times_s, sign * gone, sd_m)
+    return replace(observation, position_m=on_line.position_m, covariance_m2=on_line.covariance_m2)
 
 
 def way_text(clip: Clip, way: OtherWay) -> str:

@@ -18,7 +18,7 @@ from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 ERRORS = "errors.npz"
-NUMBERS = {"is_squared": bool, "num_errors": int, "noise_known_to": float}
+NUMBERS = {"is_squared": bool, "num_errors": int, "noise_known_to": float, "rows_of_noise": int}
 ARRAYS = ("modes_m", "turned_rad")  # which an observation may not have
 NOTHING = np.zeros((0, 0, 0, 0))
 
@@ -49,7 +49,7 @@ def with_errors(path: Path, observation: Observation) -> Observation:
         return observation
     try:
         with np.load(path) as file:
-            # Runs of earlier versions have no `noise_known_to` and no `turned_rad`.
+            # Runs of earlier versions do not have all of them.
             own = {name: kind(file[name]) for name, kind in NUMBERS.items() if name in file}
             modes, turned = file["modes_m"], file.get("turned_rad", NOTHING)
     except Exception as error:  # a damaged archive raises anything

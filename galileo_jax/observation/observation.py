@@ -73,6 +73,8 @@ class Observation:
     # How well the size of the tracking errors is known in one stretch of a motion: sd of the
     # logarithm of their variance over what is stated; 0: exactly
     noise_known_to: float = 0.0
+    # By the roughness of how many rows the size of the errors is told; 0: it is stated
+    rows_of_noise: int = 0
 
     @property
     def is_tracked_here(self) -> bool:

@@ -189,6 +189,15 @@ def test_too_few_rows_to_estimate_the_error(tmp_path: Path) -> None:
         read_observation_csv(path)
 
 
+def test_who_states_no_errors_has_them_told_by_so_many_rows(tmp_path: Path) -> None:
+    path, places = tmp_path / "track.csv", np.random.default_rng(0).standard_normal((20, 2))
+    rows = [f"{i / 30},{x},{y}" for i, (x, y) in enumerate(places)]
+    path.write_text("\n".join(["time_s,a_x_m,a_y_m", *rows]))
+    assert read_observation_csv(path).rows_of_noise == 20
+    path.write_text("\n".join(["time_s,a_x_m,a_y_m,a_sd_m", *(f"{row},1" for row in rows)]))
+    assert read_observation_csv(path).rows_of_noise == 0
+
+
 @settings(max_examples=200)
 @given(text=st.text(alphabet='time_s,object1_x_m\n\r\t0123.e-"; nai\0', max_size=80))
 def test_garbage_gives_one_line(text: str, tmp_path_factory) -> None:

@@ -52,6 +52,7 @@ def check_motion(observation: Observation, index: int = 0, shift_m: float = 0.0)
     )
     sd = np.sqrt(observation.covariance_m2[index, 0, 0][seen])
     assert 2e-4 < sd[0] < 8e-4  # 4e-4 was put in
+    assert observation.rows_of_noise == len(observation.times_s)
 
 
 TEXTS = {

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.comparison import bootstrap
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -99,3 +100,15 @@ def test_errors_of_a_tracker_are_as_uneven_as_they_are_known_to_be():
     assert (each[:, 0, 0, 0] != each[:, 0, 1, 0]).all(), "each axis has its own"
     assert np.mean(drawn**2) == pytest.approx(1.0, abs=0.03)
     assert np.std(2 * np.log(each[:, 1, 0, 0])) == pytest.approx(0.5, abs=0.02)
+
+
+def test_errors_told_by_roughness_are_known_to_no_better_than_their_rows_tell():
+    """Of a coordinate all are alike; what is drawn scatters as the estimator does."""
+    seen = replace(observe(HIT, 0), rows_of_noise=100)
+    label = np.tile(np.arange(seen.mask.shape[1]) // 10, (2, 1))
+    drawn = bootstrap._uneven(seen, label, 4000, np.random.default_rng(0))
+    each = drawn.reshape(4000, *seen.position_m.shape)
+    assert (each == each[..., :1]).all()
+    generator, times = np.random.default_rng(1), np.arange(100) / 60
+    told = [position_noise_m(times, generator.standard_normal(100)) for _ in range(1000)]
+    assert np.std(np.log(each[:, 0, 0, 0])) == pytest.approx(np.std(np.log(told)), rel=0.1)
