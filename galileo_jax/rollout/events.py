@@ -200,6 +200,18 @@ def cubic(x0: Any, x1: Any, v0: Any, v1: Any, share: Any) -> tuple[Any, Any]:
     return ((a * share + b) * share + v0) * share + x0, (3 * a * share + 2 * b) * share + v0
 
 
+@jax.custom_jvp
+def _with_slope_of(value: jax.Array, other: jax.Array) -> jax.Array:
+    """The value, with the derivative of the other."""
+    del other
+    return value
+
+
+@_with_slope_of.defjvp
+def _(primals: tuple[jax.Array, jax.Array], tangents: tuple[jax.Array, jax.Array]):
+    return primals[0], tangents[1]
+
+
 def newton(
     level: Callable[[jax.Array], tuple[jax.Array, jax.Array]], at: jax.Array, most: Any, steps: int
 ) -> tuple[jax.Array, jax.Array]:
@@ -215,14 +227,13 @@ def newton(
     def nearer(at: jax.Array, low: jax.Array, high: jax.Array) -> tuple[jax.Array, ...]:
         at = jax.lax.stop_gradient(jnp.clip(at, 0.0, most))
         left, rate = level(at)
-        falls = rate < 0
-        step = -left / jax.lax.stop_gradient(jnp.where(falls, rate, -1.0))
+        rate = jax.lax.stop_gradient(rate)
         low = jnp.where(left > 0, at, low)
         high = jnp.where(left > 0, high, at)
-        new = at + step
-        is_inside = falls & (new >= low) & (new <= high)
-        new = jax.lax.stop_gradient(jnp.where(is_inside, new, 0.5 * (low + high)))
-        return new + jnp.where(falls, step - jax.lax.stop_gradient(step), 0.0), low, high, left
+        new = at - left / jnp.where(rate < 0, rate, -1.0)
+        is_inside = (rate < 0) & (new >= low) & (new <= high)
+        safe = jnp.where(is_inside, new, 0.5 * (low + high))
+        return _with_slope_of(safe, jnp.where(rate < 0, new, 0.0)), low, high, left
 
     def early(_: Any, carry: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
         return jax.lax.stop_gradient(nearer(*carry)[:3])
