@@ -3,17 +3,19 @@
     z = mode + R (u + B u^2 + C u^3),  u = V^T w      R R^T the covariance; B, C strictly
                                                       lower triangular; V orthogonal
 
-The columns of R are the eigenvectors V of the covariance, each times its standard deviation, least
-determined direction first. Along such a direction the well-determined ones shift by several of
-their own standard deviations (for example if object 2 hardly slides). A normal proposal with any
+The columns of R are the eigenvectors V of the covariance, each times its standard deviation D,
+least determined direction first. Along such a direction the well-determined ones shift by several
+of their own standard deviations (for example if object 2 hardly slides). A normal proposal with any
 covariance is then almost always rejected. B and C describe this shift. Each direction shifts only
 better-determined ones, so the map is invertible and its determinant constant: the densities of w
 and z differ by a constant factor.
 
 Random numbers are drawn for w, not for u. An eigenvector has no sign, and those of equal
 eigenvalues (two parameters that do not show) are any basis of their plane; which ones come out
-depends on the processor's rounding. The map from w has the symmetric root V D^1/2 V^T in the place
-of R and does not depend on that choice.
+depends on the processor's rounding. The map from w has the symmetric root V D V^T in the place of R
+and does not depend on that choice; but B and C do, of two parameters of which one shows where it is
+moved far. So S covariance S is taken, S diagonal, with entries up to `SPLIT` apart, whose
+eigenvalues differ, and R = S^-1 V D: R R^T is the covariance all the same.
 
 How far a direction must be moved follows from the misfit's slopes G (in u, with the mode's
 Jacobian) where another, j, is moved by h = 2 standard deviations, two rollouts each:
@@ -39,6 +41,7 @@ from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.t_proposal import Points, Values, log_student_t, student_t
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
+SPLIT = 0.01  # by how much the scale of the last parameter differs from the first's
 LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some below 0
 
 
@@ -105,11 +108,13 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     size, directions = len(own), len(fit.z) - count + len(own)
     root, axes = np.zeros((len(fit.z), directions)), np.eye(directions)
     quadratic, cubic = np.zeros((directions, directions)), np.zeros((directions, directions))
-    variance, vectors = np.linalg.eigh(fit.covariance[np.ix_(own, own)])
+    scale = 1 + SPLIT * np.arange(size) / size
+    variance, vectors = np.linalg.eigh(scale[:, None] * fit.covariance[np.ix_(own, own)] * scale)
     for vector in vectors.T:  # a ridge is followed by the sign, too
         vector *= np.sign(vector[np.abs(vector).argmax()])
     axes[:size, :size] = vectors[:, ::-1]
-    root[own, :size] = axes[:size, :size] * np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
+    sd = np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
+    root[own, :size] = axes[:size, :size] * sd / scale[:, None]
     # Noise scales, behind the others, hardly depend on these.
     root[count:, size:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
     slopes = residuals.slopes(fit.points(fit.z[None]), fit.steps[None], sides="open")
