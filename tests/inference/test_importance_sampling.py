@@ -160,6 +160,16 @@ def test_a_cloud_changes_smoothly_as_weights_do():
     assert np.abs(np.diff(widths)).max() < 0.02 * np.ptp(widths)
 
 
+@pytest.mark.parametrize("num_left", [3, 100])
+def test_draws_of_no_weight_are_none_of_a_cloud(num_left):
+    """Fewer or more of some weight than a cloud needs."""
+    z = np.random.default_rng(5).standard_normal((500, 2))
+    log_weights = np.where(np.arange(500) < num_left, -np.sum(9 * z**2, axis=1), -np.inf)
+    cloud, own = (Cloud.of(z[:k], log_weights[:k], np.ones(2, bool)) for k in (500, num_left))
+    np.testing.assert_allclose(cloud.mean, own.mean, rtol=1e-9)
+    np.testing.assert_allclose(cloud.root, own.root, rtol=1e-9)
+
+
 def test_clouds_are_fitted_seldom(monkeypatch):
     """Each multiplies what rounding did to the one before: six for sixteen batches."""
     made, of = [], Cloud.of

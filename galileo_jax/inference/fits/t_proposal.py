@@ -16,6 +16,7 @@ from galileo_jax.numerics.normal_matrix import symmetric_root
 
 FREEDOM = 5.0  # degrees of it, of Student's t
 DRAWS_PER_PARAMETER = 4.0  # that weights must be worth, or they are flattened
+LEAST_POWER = 1e-12  # not 0, whose product with the logarithm of no weight is no number
 LEAST_VARIANCE = 1e-10  # in z, of a direction in which draws do not differ
 
 Points = Float[np.ndarray, "draw parameter"]
@@ -49,8 +50,7 @@ class Cloud:
     def of(cls, z: Points, log_weights: Values, free: Bool[np.ndarray, " parameter"]) -> "Cloud":
         """The t with mean and covariance of draws, their weights flattened till enough count."""
         own = z[:, free]
-        power = _flattened(log_weights, DRAWS_PER_PARAMETER * own.shape[1])
-        weights = softmax(power * log_weights)
+        weights = softmax(_power(log_weights, DRAWS_PER_PARAMETER * own.shape[1]) * log_weights)
         mean = weights @ own
         far = own - mean
         return cls(mean, symmetric_root((weights * far.T) @ far, LEAST_VARIANCE), free)
@@ -68,19 +68,22 @@ class Cloud:
         return log_student_t(u, self.freedom) - np.linalg.slogdet(self.root)[1]
 
 
-def _flattened(log_weights: Values, enough: float) -> float:
+def _power(log_weights: Values, enough: float) -> float:
     """The power of the weights, at most 1, by which they are worth so many draws.
 
-    0 where there are no more.
+    Nearly 0, where all of some weight weigh the same, if there are no more of these.
     """
-    if worth(log_weights) >= enough:
+
+    def left_over(power: float) -> float:
+        return worth(power * log_weights) - enough
+
+    if left_over(1.0) >= 0:
         return 1.0
-    if len(log_weights) <= enough:
-        return 0.0
+    if left_over(LEAST_POWER) <= 0:
+        return LEAST_POWER
     from scipy.optimize import root_scalar  # most draws never come here
 
-    found = root_scalar(lambda power: worth(power * log_weights) - enough, bracket=(0.0, 1.0))
-    return float(found.root)
+    return float(root_scalar(left_over, bracket=(LEAST_POWER, 1.0)).root)
 
 
 def log_student_t(u: Points, freedom: float = FREEDOM) -> Values:
