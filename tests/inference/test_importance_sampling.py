@@ -82,6 +82,7 @@ UNSEEN: Any = Known(lambda a, b: (6 * np.exp(a) / (1 + np.exp(8 * b)) - LEFT, 0 
 CRESCENT: Any = Known(
     lambda a, b: ((a - 0.1) / 0.4, 300 * (np.exp(b / 3) + np.exp(a / 2 + a**3 / 8) - 2))
 )
+FLAT: Any = Known(lambda a, b: (0 * a, 0 * b))  # no data: the prior alone
 TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
 
 
@@ -219,3 +220,14 @@ def test_the_density_along_a_ridge_is_that_of_its_draws():
     )
     beyond = fit.z + 1.1 * ridge.edges[-1] * valley.root[:, ridge.direction]
     assert ridge.log_density(beyond[None]) == -np.inf
+
+
+def test_directions_that_do_not_show_are_the_same_whatever_rounding_leaves():
+    """Covariances a rounding apart, in which any two directions are as good, make one map."""
+    fit = FLAT.fit((0.0, 0.0))
+    maps = [
+        valley_round(replace(fit, covariance=np.eye(2) + off * (1 - np.eye(2))), FLAT)
+        for off in (0.0, 1e-15, -1e-15)
+    ]
+    for other in maps[1:]:
+        np.testing.assert_allclose(other.root, maps[0].root, atol=1e-9)
