@@ -88,6 +88,9 @@ TEMPLATES = {
     "imperfections_explain": "With imperfections, of sizes that are {size}, the data do not "
     "contradict the model without effects ({p_value:p}), and no effect beside them is "
     "{least_log_odds:times} as probable.",
+    "form_beside": "{hypothesis}, a form without a name, is {log_odds:times} as probable as no "
+    "effect; beside imperfections, which stand for anything smooth as well, "
+    "{least_log_odds:times} are needed.",
     "imperfections_fail": "Imperfections of surfaces, hits and marks {why}.",
 }
 # Numbers that a template names and nobody gives: of the hypothesis, or of it and its rival.

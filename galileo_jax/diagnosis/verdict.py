@@ -74,6 +74,9 @@ def without_a_name(
     if any(c.log_odds >= (CONVINCING if c.is_form else DECISIVE) for c in explaining):
         return None
     why = (reasons.imperfections_explain(comparison, DECISIVE),)
+    form = next((c for c in explaining if c.is_form and c.log_odds >= DECISIVE), None)
+    if form is not None:
+        why = (*why, because("form_beside", form, least_log_odds=CONVINCING))
     if not comparison.unusual:
         return Verdict("none", (), reasons=why)
     name = AS_EFFECTS.get(comparison.unusual)

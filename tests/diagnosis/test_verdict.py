@@ -659,6 +659,15 @@ def test_a_form_beside_usual_imperfections_has_to_convince(best, status):
     assert (None if verdict is None else verdict.status) == status
 
 
+@pytest.mark.parametrize(("best", "rules"), [(3 - EDGE, 1), (3 + EDGE, 2)])
+def test_a_form_that_leads_beside_imperfections_is_told_of(best, rules):
+    """The table has it first, and 'no effect is 20 times as probable' stands below."""
+    found = Comparison(0.5, (), (), {}, (), (), (1.0,), False)
+    verdict = without_a_name(found, [candidate(FORM, best)])
+    assert verdict is not None
+    assert [one.rule for one in verdict.reasons] == ["imperfections_explain", "form_beside"][:rules]
+
+
 def test_friction_that_would_push_is_no_uneven_friction():
     found = Comparison(0.5, (), (), {}, (), (), (1.0,), False, ("friction_roughness",))
     assert without_a_name(found, [candidate("air_drag", -9.0)], is_friction=False) is None
