@@ -20,11 +20,13 @@ and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int
 Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase flow (impact).
 """
 
-from galileo_jax.model.effects import Effect, Normal, Parameter, Rims, Role, Uniform, by_object
+from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter, Rims, Role, Uniform, by_object
 
 # In `Surroundings.expected`: how well places relative to each other are known.
 OFFSET = "hit_offset"
 OFFSETS = (f"{OFFSET}_x", f"{OFFSET}_y")
+# Friction of two rims: plastics 0.1 to 0.4, rubber 1; magnets in rims repel, and hardly touch.
+GRIP, GRIP_SD = 0.1, 1.5  # the median; of the logarithm
 START = ("start_velocity_x", "start_velocity_y", "start_turning")
 
 
@@ -44,7 +46,7 @@ class Pucks(Effect, where=lambda scene: "pucks" in scene.laws):
         if len(scene.names) > 1:
             found += [
                 Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
-                Parameter("grip", "1", Uniform(0.0, 1.0), 0.0, "main", 0.1),
+                Parameter("grip", "1", LogNormal(GRIP, GRIP_SD), 0.0, "main", 0.1),
             ]
             place = Normal(*scene.expected[OFFSET])
             found += [
