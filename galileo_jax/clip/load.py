@@ -190,6 +190,8 @@ def check_clip(
         read = read_track(path, path.parent / file.track, file, None if is_timed else file.fps)
         if is_timed:
             file = file.model_copy(update={"fps": read.fps})
+        if not read.is_own:
+            file = _let_go_whenever(file)
     found = _observed(path, file, read) if read else _filmed(path, file)
     check_camera(file, fail)
     clip = Clip.model_validate({**dict(file), "path": path, **found})
@@ -199,6 +201,17 @@ def check_clip(
         clip = clip.model_copy(update={"pixels_per_metre": scale_of_rectangle(clip)})
     check_against_source(clip, read.observation if read else None, fail)
     return clip
+
+
+def _let_go_whenever(file: ClipFile) -> ClipFile:
+    """A table that others made begins anywhere: its first row is no release unless it is said."""
+    objects = tuple(
+        item
+        if "first_frame" in item.model_fields_set
+        else item.model_copy(update={"first_frame": None})
+        for item in file.objects
+    )
+    return file.model_copy(update={"objects": objects})
 
 
 def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:

@@ -209,8 +209,8 @@ def _left_picture(track: Track) -> int:
 def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inferring) -> Clip:
     """The clip with `starts_moving`, where nobody lets the object go in what is left of it.
 
-    On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
-    and not assumed.
+    Where it is declared when it is let go on a ramp with a table, whoever moves then was perhaps
+    pushed, which is an effect: it is said and not assumed.
     """
     scenario, first = SCENARIOS[clip.scenario], clip.objects[0]
     if "starts_moving" not in scenario.keys:
@@ -220,11 +220,12 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
         return moving
     if clip.starts_moving is not None:
         return clip
+    is_declared = scenario.has_table and first.first_frame is not None
     seen = on_ramp(observation) if scenario.has_table else observation
     found = start_speed(seen)
     if found is None:
-        is_declared = clip.scenario == "ramp" and first.first_frame is not None
-        if is_declared and (rests_s := rest_s(seen)) is not None:
+        is_ramp = is_declared and clip.scenario == "ramp"
+        if is_ramp and (rests_s := rest_s(seen)) is not None:
             told.say(
                 f"{first.name} rests for {rests_s:.2g} s from frame {first.first_frame} on, where "
                 "it is declared to be let go; write `first_frame: null` for it, which takes the "
@@ -234,11 +235,11 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
     how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
     what_then = (
         "declare `starts_moving: true` if it was let go before, or try the effect initial_push"
-        if scenario.has_table
+        if is_declared
         else "its speed there is inferred (`starts_moving: false` if it is at rest there)"
     )
     told.say(f"{first.name} moves already in the first frame that is used{how_fast}; {what_then}")
-    return clip if scenario.has_table else moving
+    return clip if is_declared else moving
 
 
 def _as_discs(clip: Clip, **update: Any) -> Clip:

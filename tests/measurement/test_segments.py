@@ -121,6 +121,18 @@ def test_a_bounce_between_two_frames_ends_the_flight_before_it(seed):
     assert blow_frame(seen(place, times, 2e-3)) == 22
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_blow_stands_out_from_weight(seed: int) -> None:
+    """Three times what weight changes in five frames: without weight it is all there is."""
+    rng = np.random.default_rng(seed)
+    times, hit_s = np.arange(44) / 60, 0.4
+    late, turn = np.maximum(times - hit_s, 0.0), rng.uniform(0, 2 * np.pi)
+    place = np.stack([1.6 * times, 3.3 * times - 4.905 * times**2])
+    place += 2.5 * np.outer([np.cos(turn), np.sin(turn)], late)
+    found = blow_frame(seen(place + rng.normal(0, 1e-3, place.shape), times, 1e-3))
+    assert found is not None and abs(found - 24) <= 1
+
+
 @pytest.mark.parametrize(
     ("fps", "settles_s"), [(30.0, 0.33), (60.0, 0.4), (120.0, 0.2), (240.0, 0.1)]
 )

@@ -35,8 +35,9 @@ def jumps(path: PointPath, most_m_s2: float, clear: float) -> Bool[np.ndarray, "
 def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False) -> int | None:
     """The last frame before an object is struck; None where nothing strikes it.
 
-    With c = v_b - v_a the change of velocity between the medians of the `STEPS` steps on either
-    side of a frame, d the time between their middles, it is a blow if
+    With c = v_b - v_a - a d the change of velocity between the medians of the `STEPS` steps on
+    either side of a frame, d the time between their middles, a the run's usual acceleration (the
+    median of each axis: weight, or a slope's pull), it is a blow if
 
         |c| > HIT_M_S2 times a step            (no friction, drag or weight accelerates so)
         |c| > SHARE of the speed before        (a bump on the way is none)
@@ -61,8 +62,10 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     # From the middle of one window to that of the next which shares no step with it.
     apart = STEPS + SMEARED - 1
     before, after = slice(None, -apart), slice(apart, None)
-    size = np.linalg.norm(usual[:, after] - usual[:, before], axis=0)
     between_s = middle_s[after] - middle_s[before]
+    change = usual[:, after] - usual[:, before]
+    usual_pull = np.median(change / between_s, axis=1, keepdims=True)
+    size = np.linalg.norm(change - usual_pull * between_s, axis=0)
     own_m_s2 = size / between_s
     beside = np.pad(own_m_s2, apart, constant_values=np.inf)
     beside = np.minimum(beside[: -2 * apart], beside[2 * apart :])

@@ -51,3 +51,30 @@ def test_a_rest_before_the_release_is_said(first_frame: str, is_said: bool, tmp_
     said = [line for line in remarks if "first_frame: null" in line]
     assert bool(said) == is_said
     assert not is_said or "object1 rests for 0.4 s from frame 0 on" in said[0]
+
+
+@pytest.mark.parametrize("first_frame, is_found", [(None, True), ("0", False), ("null", True)])
+def test_a_table_of_others_begins_anywhere(
+    first_frame: str | None, is_found: bool, tmp_path: Path
+) -> None:
+    """Nobody says that it is let go in its first row, unless somebody writes it."""
+    path = write_track(tmp_path, "0")
+    rows = (tmp_path / "held.csv").read_text().splitlines()[1:]
+    table = "\n".join(["t (s),x (m),y (m)", *(row.rpartition(",")[0] for row in rows)])
+    (tmp_path / "held.csv").write_text(table + "\n")
+    said = "" if first_frame is None else f", first_frame: {first_frame}"
+    path.write_text(YAML.replace(", first_frame: FRAME", said) + "track_y: up\n")
+    measured = measure(load_clip(path))
+    release_s, _ = build_scene(measured.clip, measured.observation).surroundings.release_s
+    assert release_s == pytest.approx(HELD_S if is_found else 0.0, abs=0.04)
+
+
+def test_what_moves_in_the_first_row_of_a_table_of_others_starts_moving(tmp_path: Path) -> None:
+    path = write_track(tmp_path, "0")
+    rows = (tmp_path / "held.csv").read_text().splitlines()[20:]  # on its way
+    table = "\n".join(["t (s),x (m),y (m)", *(row.rpartition(",")[0] for row in rows)])
+    (tmp_path / "held.csv").write_text(table + "\n")
+    path.write_text(YAML.replace(", first_frame: FRAME", "") + "track_y: up\n")
+    measured = measure(load_clip(path))
+    assert measured.clip.starts_moving
+    assert any("its speed there is inferred" in line for line in measured.remarks)
