@@ -14,11 +14,15 @@ import math
 
 import numpy as np
 
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.observation.observation import UNMEASURED_SD_M
 from galileo_jax.runtime.errors import InputError
 
 MIN_NOISE_WINDOWS = 8
-"""Fewer third differences give a standard deviation that is off by a third or more."""
+"""The median of fewer third differences is off by a third or more."""
+
+FEWEST_ROWS = 6
+"""That tell an error: a parabola leaves three numbers, and their variance has a mean."""
 
 ACROSS = 0.01
 """Who marks a picture is no hundred times better across the motion than along it: then one
@@ -42,12 +46,18 @@ def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
     its absolute value times 1.4826 is the standard deviation, and is not moved by the few
     points at an impact. Not below `MIN_SD_M`.
 
+    Of fewer than `MIN_NOISE_WINDOWS` windows it is the root of the variance's mean, after a
+    parabola that leaves S of n places (inverse gamma; larger than S / (n - 3), for so few may lie
+    near it by chance):
+
+        sd^2 = S / (n - 5)
+
     Args:
       times_s: `[frame]`, s, increasing; need not be evenly spaced.
       position_m: `[frame]`, m; NaN where not visible.
 
     Returns:
-      the standard deviation; NaN if fewer than `MIN_NOISE_WINDOWS` windows are visible.
+      the standard deviation; NaN of fewer than `FEWEST_ROWS` places.
 
     Limits: assumes errors independent between frames. Motion that changes within three
     frames for most of the clip counts as noise.
@@ -56,12 +66,20 @@ def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
     if len(t) < MIN_NOISE_WINDOWS:  # of a track in steps of several rows, no four are consecutive
         seen = np.isfinite(position_m)
         t, x = _whole_windows(times_s[seen], position_m[seen])
-    if len(t) < MIN_NOISE_WINDOWS:
-        return math.nan
+        if len(t) < MIN_NOISE_WINDOWS:
+            return _about_parabola_m(times_s[seen], position_m[seen])
     gaps = t[:, :, None] - t[:, None, :] + np.eye(4)
     weights = 1 / gaps.prod(axis=2)
     draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
     return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
+
+
+def _about_parabola_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
+    """`position_noise_m` of few places."""
+    if (count := len(times_s)) < FEWEST_ROWS:
+        return math.nan
+    left = polynomial(times_s - times_s[0], position_m, 2).left
+    return max(math.sqrt(left @ left / (count - 5)), MIN_SD_M)
 
 
 def _whole_windows(times_s: np.ndarray, position_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -78,14 +96,14 @@ def told_noise_m(name: str, times_s: np.ndarray, position_m: np.ndarray) -> floa
     """`position_noise_m` of an object. Raises `InputError` where too few rows tell it."""
     sd = position_noise_m(times_s, position_m)
     if math.isnan(sd):
-        raise _too_few(name, f"too few consecutive rows ({MIN_NOISE_WINDOWS + 3}")
+        raise _too_few(name, f"too few rows ({FEWEST_ROWS}")
     return sd
 
 
 def _too_few(name: str, rows: str) -> InputError:
     return InputError(
-        f"column '{name}_sd_m': missing, and {rows} expected) to estimate it; give the error in "
-        "metres"
+        f"{name}: {rows} expected) to tell how large its errors are; our own csv may state them, in "
+        f"a column {name}_sd_m"
     )
 
 
@@ -98,7 +116,7 @@ def roughness_covariance_m2(name: str, times_s: np.ndarray, position_m: np.ndarr
     distance from it tells nothing: there it is `UNMEASURED_SD_M`.
 
     Raises:
-      InputError: too few consecutive rows to tell.
+      InputError: too few rows to tell.
     """
     sd = [told_noise_m(name, times_s, coordinate) for coordinate in position_m]
     covariance = np.diag(np.square(sd))
