@@ -21,7 +21,7 @@ from galileo_jax.clip.fields import MAX_ANGLE_SD_DEG, MAX_SIZE_M, MIN_RAMP_ANGLE
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.sizes import extents
-from galileo_jax.numerics.least_squares import Line, line_through, two_lines
+from galileo_jax.numerics.least_squares import Line, line_through, polynomial, two_lines
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -29,6 +29,8 @@ LEVEL_SD_DEG = 0.5  # how level a camera stands on a tripod, and how straight a 
 MAX_SCATTER_SD_DEG = 2.0  # a path that tells its slope no better does not tell it
 UPPER_SHARE = 0.75  # of the way down; further down the object's front is on the table already
 MIN_POINTS = 5  # on a line, or on either side of a bend
+SHARP = 1 / 3  # of what a parabola leaves: two lines leave less where a path bends at one place
+OFF_SDS = 4.0  # of the errors: a place that is so far from a line is not on it
 MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
 BEGIN_SHARE, LEAST_BEND = 0.5, 0.01  # of a valley's way; by so many rad its slope changes there
 SIZE_SD_M = 0.003  # a marked point is the centre, and a height right, no better
@@ -195,6 +197,33 @@ def _meeting(before: Line, after: Line) -> np.ndarray:
     """Where two lines cross, `[2]`."""
     both = np.stack([before.along, -after.along], axis=1)
     return before.middle + np.linalg.solve(both, after.middle - before.middle)[0] * before.along
+
+
+def end_of_slope(observation: Observation) -> int | None:
+    """The last frame before the slope of the first path ends in another; None where it goes on.
+
+    Two straight lines that differ by `MIN_BEND_DEG` and leave a third of what a parabola does: a
+    path that bends all along has no such end.
+    """
+    frames = np.flatnonzero(observation.mask[0])
+    points = observation.position_m[0][:2, frames]
+    best = two_lines(points, 2 * MIN_POINTS)
+    if best is None or abs(falls_deg(best[0]) - falls_deg(best[1])) < MIN_BEND_DEG:
+        return None
+    at = best[2]
+    # What turns over an edge leaves both lines: each is told by what is far from it.
+    parts = points[:, : at - at // 4], points[:, at + (len(frames) - at) // 4 :]
+    lines = [line_through(part) for part in parts]
+    left = np.sqrt([line.spread[0] / part.shape[1] for line, part in zip(lines, parts, strict=True)])
+    whole = line_through(points)
+    along, across = np.stack([whole.along, whole.across]) @ (points - whole.middle[:, None])
+    bent = polynomial(along, across, 2).left
+    if left.max() > SHARP * math.sqrt(float(np.mean(bent**2))):
+        return None
+    sd_m = max(math.sqrt(float(np.median(observation.variance_m2[0, frames]))), float(left[0]))
+    off = np.abs(lines[0].across @ (points - lines[0].middle[:, None]))
+    is_off = (off > OFF_SDS * sd_m) & (np.arange(len(frames)) >= parts[0].shape[1])
+    return int(frames[int(np.argmax(is_off)) - 1]) if is_off.any() else None
 
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:

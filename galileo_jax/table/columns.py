@@ -13,7 +13,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import clock_times
 from galileo_jax.table.heading import Heading
 from galileo_jax.table.numbers import Numbers, is_nothing, is_number, parse_columns
-from galileo_jax.table.titles import LENGTHS, Title, is_no_place
+from galileo_jax.table.titles import LENGTHS, RADIANS, Title, is_no_place
 from galileo_jax.table.track_table import MIN_LIKELIHOOD
 
 PLACES = ("x", "y", "z", "line", "angle")
@@ -52,7 +52,8 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     meanings = list(heading.meanings)
     left = [n for n, one in enumerate(meanings) if not one.role and _may_be_used(heading, n)]
     if len(left) == 1 and not any(one.role in PLACES for one in meanings):
-        meanings[left[0]] = replace(meanings[left[0]], role="line")
+        alone = meanings[left[0]]
+        meanings[left[0]] = replace(alone, role="angle" if alone.unit in RADIANS else "line")
     has_clock = any(one.role in ("time", "frame") for one in meanings)
     has_place = any(one.role in PLACES for one in meanings)
     asked = [n for n, one in enumerate(meanings) if one.role or

@@ -87,7 +87,7 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
     lower = [token.lower() for token in tokens]
     joined = "".join(lower).rstrip("#").replace("number", "").replace("index", "")
     if WORDS.get(joined) in ("frame", "object", "time"):
-        return Title(WORDS[joined], unit=unit)
+        return Title("time" if unit in SECONDS else WORDS[joined], unit=unit)  # 'Tid (s)' is Danish
     if DERIVED & set(lower) or (SYMBOLS & set(tokens) and unit not in LENGTHS):
         return Title("", unit=unit)
     if unit is None and len(lower) > 1 and lower[-1] in UNITS and lower[-1] not in WORDS:

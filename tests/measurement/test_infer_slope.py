@@ -10,9 +10,11 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command, export, fit
-from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
+from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG, end_of_slope
 from galileo_jax.measurement.measure import inferred, measure
+from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
+from tests.measurement.seen import seen
 
 YAML = """\
 track: slide.csv
@@ -118,3 +120,29 @@ def test_inferred_angle_enters_the_fit(tmp_path: Path) -> None:
     # d k / d angle = 1 + k tan(angle) per radian
     from_angle = math.radians(LEVEL_SD_DEG) * (1 + friction * math.tan(math.radians(20)))
     assert found["sd"] == pytest.approx(from_angle, rel=0.3)
+
+
+def bent_path(turn_deg: float, length_m: float, seed: int = 0) -> Observation:
+    """Down 17 degrees for 0.8 s, and on in a direction turned by `turn_deg` over `length_m`."""
+    times = np.arange(72) / 60
+    way = np.linspace(0.0, 1.2, 5001)
+    turned = np.clip((way - 0.5 + length_m / 2) / max(length_m, 1e-9), 0, 1) * turn_deg
+    angle = np.radians(turned - 17.0)
+    path = np.cumsum(np.stack([np.cos(angle), np.sin(angle)]), axis=1) * (way[1] - way[0])
+    gone = np.minimum(0.5 * 1.6 * times**2, 1.2)
+    place = np.stack([np.interp(gone, way, one) for one in path])
+    return seen(place, times, 5e-4, seed)
+
+
+@pytest.mark.parametrize("turn_deg", [17.0, 8.0, -30.0])
+@pytest.mark.parametrize("length_m", [0.0, 0.04])
+def test_a_slope_ends_where_its_path_bends_at_one_place(turn_deg: float, length_m: float) -> None:
+    """At 0.5 m, after 0.79 s."""
+    for seed in range(5):
+        last = end_of_slope(bent_path(turn_deg, length_m, seed))
+        assert last is not None and 42 <= last <= 50
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 3.0, 15.0, 40.0])
+def test_a_board_that_is_bent_all_along_has_no_end(turn_deg: float) -> None:
+    assert [end_of_slope(bent_path(turn_deg, 1.0, seed)) for seed in range(10)] == [None] * 10

@@ -126,6 +126,20 @@ def test_every_form_is_the_same_throw(content: str, tmp_path: Path) -> None:
     check(read(tmp_path, content))
 
 
+@pytest.mark.parametrize(
+    ("title", "unit"), [("Vinkel (°)", np.pi / 180), ("kąt / deg", np.pi / 180), ("açı (rad)", 1.0)]
+)
+@pytest.mark.parametrize("clock", ["Tid (s)", "t (s)"])
+def test_what_is_in_degrees_is_an_angle(
+    clock: str, title: str, unit: float, tmp_path: Path
+) -> None:
+    """Whatever it is called; 'tid' alone would number particles."""
+    table = read(tmp_path, text(f"{clock};{title}", body=lines(";", columns=(0, 1))))
+    assert table.axes == ("angle",)
+    np.testing.assert_allclose(table.position[0, 0], unit * truth()[1])
+    np.testing.assert_allclose(table.clock, truth()[0])
+
+
 ENCODINGS = {
     "utf-8-sig": "t,x,y",
     "utf-16": "t,x,y",

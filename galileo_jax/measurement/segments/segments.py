@@ -6,7 +6,7 @@ what is no more the object that was marked is `Astray`.
 
     board without a table    from the rest after which it comes down, and from where the hand is
                              off, up the board from where it gains no more speed; to a stop, a blow,
-                             or the rest after which it is carried away
+                             the end of the slope, or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
     fall, flight, board      to where the film goes over to slow motion
     fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
@@ -30,6 +30,7 @@ from jaxtyping import Bool
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.measurement.infer_ramp import end_of_slope
 from galileo_jax.measurement.segments import blow, handling, rest
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
@@ -47,6 +48,10 @@ STRUCK = (
 CHANGES_RATE = (
     "goes on {:.3g} times as fast, its acceleration by the square of that: the frame rate changes "
     "there (slow motion?), which only a cut film or a table with true times can mend"
+)
+SLOPE_ENDS = (
+    "comes to the end of the slope: its path goes on in another direction (scenario `ramp` has a "
+    "table behind it)"
 )
 LANDED = "comes down on the table"
 RESTS = "is at rest, and so is everything else that is still seen"
@@ -177,6 +182,8 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
         ends.append((stop, STRUCK if goes_on else STOPPED))
     if is_swing:
         ends.append((rest.standstill_frame(observation), STOPPED))
+    if SCENARIOS[clip.scenario].has_ramp:
+        ends.append((end_of_slope(observation), SLOPE_ENDS))
     if is_board or is_free or is_swing:
         is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
         find = blow.bounce_frame if is_in_space else blow.blow_frame
