@@ -10,11 +10,11 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.segments.handling import (
     goes_up,
-    let_go_frame,
     pushed_frame,
     thrown_frame,
 )
 from galileo_jax.measurement.segments.rest import standstill_frame
+from galileo_jax.measurement.segments.start_speed import let_go_frame
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
 
@@ -111,6 +111,20 @@ def test_the_release_is_found_however_late(fps: float, held_s: float) -> None:
     frame = let_go_frame(swing(fps, held_s))
     assert frame is not None
     assert -1.5 / fps < frame / fps - held_s < 3 / fps + 0.01
+
+
+@pytest.mark.parametrize(
+    ("held_s", "settles_s"), [(0.08, 0.16), (0.08, 0.5), (0.3, 0.1), (0.3, 0.16), (0.3, 0.5)]
+)
+def test_what_is_slowed_down_is_not_told_from_before_its_release(
+    held_s: float, settles_s: float
+) -> None:
+    """A frame in which it still rests would be taken for one in which it goes back."""
+    times, speed = np.arange(70) / 50, 0.84
+    gone = speed * settles_s * np.log(np.cosh(np.clip(times - held_s, 0, None) / settles_s))
+    for seed in range(8):
+        frame = let_go_frame(seen(np.stack([0 * gone, -gone]), times, 5e-4, seed))
+        assert frame is not None and held_s - 0.6 / 50 < times[frame] < held_s + 0.08
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])

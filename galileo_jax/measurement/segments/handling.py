@@ -26,40 +26,7 @@ WAY, EARLY = (0.15, 0.7), 0.2  # shares of the length of the way
 WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
 PUSHED_WAY = 0.5  # of the way on a level table
 LATER = 0.4  # of the windows of what falls or flies: the others tell what is usual
-FIRST_WAY = (0.05, 0.3)  # of a swing: between these shares of it a line is laid
-LEAST_S, LEAST_FRAMES = 0.04, 4  # held for less, or in fewer frames, it is not held
-LEAST_PLACES = 3  # through which the line is laid
-STILL_SD = 6.0  # of the errors: what is farther from where it was has moved
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
-
-
-def let_go_frame(observation: Observation) -> int | None:
-    """The first frame in which a swing moves by itself; None where it is not held at first.
-
-    From rest the distance d from where it was grows as (t - t0)^2: the root of a straight line
-    through sqrt(d), between a twentieth and three tenths of the first way, is when it is let go.
-    What swings already when the film begins has its root before the first frame; its place at rest
-    scatters by no more than errors do. What sinks in a liquid is let go so, too.
-    """
-    path = observation.path()
-    times, place = path.times_s, path.place_m
-    if len(path) < 2 * LEAST_FRAMES:
-        return None
-    stood = np.median(place[:, :LEAST_FRAMES], axis=1, keepdims=True)
-    gone = np.linalg.norm(place - stood, axis=0)
-    farthest = int(np.argmax(gone > FIRST_WAY[1] * gone.max()))  # where the first way is that long
-    low = max(FIRST_WAY[0] * gone.max(), STILL_SD * float(np.sqrt(np.median(2 * path.variance_m2))))
-    moves = np.flatnonzero(gone[: farthest + 1] > low)
-    if len(moves) < LEAST_PLACES:
-        return None
-    slope, intercept = np.polyfit(times[moves], np.sqrt(gone[moves]), 1)
-    if slope <= 0:
-        return None
-    let_go_s, step_s = -intercept / slope, float(np.median(np.diff(times)))
-    is_held = let_go_s - times[0] >= max(LEAST_S, LEAST_FRAMES * step_s)
-    was_elsewhere = (gone[times < let_go_s - step_s] > low).any()
-    at = int(np.searchsorted(times, let_go_s + step_s))
-    return int(path.frames[at]) if is_held and not was_elsewhere and at < len(path) else None
 
 
 def hand_frame(observation: Observation) -> int | None:

@@ -35,6 +35,7 @@ from galileo_jax.measurement.segments import blow, handling, rest
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
 from galileo_jax.measurement.segments.rate_change import rate_change
+from galileo_jax.measurement.segments.start_speed import let_go_frame
 from galileo_jax.measurement.segments.track_failure import Astray, find_astray
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.toss_flight import last_free_frame
@@ -152,7 +153,7 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         first, last = rest.placed_frames(kept.observation)
         kept = kept.cut("before", first, PLACED).cut("after", last, TAKEN)
     if clip.scenario in SWINGS:
-        kept = kept.cut("before", handling.let_go_frame(kept.observation), IS_HELD)
+        kept = kept.cut("before", let_go_frame(kept.observation), IS_HELD)
     if (scenario.has_ramp or is_free) and (change := rate_change(kept.observation)) is not None:
         # Before other ends are looked for: a clock that changes looks like a blow.
         last = change[0] - (EXPOSED_FRAMES if kept.observation.is_tracked_here else 0)

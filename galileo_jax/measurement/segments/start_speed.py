@@ -25,6 +25,7 @@ EARLY = 0.5  # of the way
 FEWEST, TERMS = 9, 5  # places, and numbers that describe them
 NEAR_FOOT = 0.25  # of the way down a ramp to its table
 CLEAR = 5.0  # standard deviations
+SURE = 3.0  # the same, where it is clear that it is not let go at once
 RELEASES = 48  # instants between which the best is looked for
 
 
@@ -40,8 +41,7 @@ def start_speed(observation: Observation) -> StartSpeed | None:
     early = _first_half(observation)
     if early is None:
         return None
-    powers = np.vander(early.times_s, TERMS, increasing=True)
-    fit = early.fit(powers)
+    fit = early.moving()
     moving, moves_cost = fit.solution, float(np.sum(fit.left**2))
     size = early.scatter(moves_cost)
     sd_m_s = math.sqrt(size * fit.inverse[1, 1])
@@ -55,16 +55,34 @@ def start_speed(observation: Observation) -> StartSpeed | None:
 def rest_s(observation: Observation) -> float | None:
     """How long object 1 rests where it is first seen, s; None where it is let go at once, or moves.
 
-    It rests if a release that late is likelier than one in the first frame by `CLEAR` standard
-    deviations.
+    It rests if a release that late is likelier than one in the first frame, by `CLEAR` standard
+    deviations, and than a start in motion, by `SURE`.
     """
     early = _first_half(observation)
     if early is None:
         return None
     cost, release_s = early.let_go()
-    better = early.release_cost(0.0) - cost
     is_later = release_s > 1.5 * float(np.median(np.diff(early.times_s)))
-    return release_s if is_later and better > CLEAR**2 * early.scatter(cost) else None
+    is_later &= early.release_cost(0.0) - cost > CLEAR**2 * early.scatter(cost)
+    moving = float(np.sum(early.moving().left ** 2))
+    return release_s if is_later and moving - cost > SURE**2 * early.scatter(cost) else None
+
+
+def let_go_frame(observation: Observation) -> int | None:
+    """The first frame in which a swing moves by itself; None where it is not held at first.
+
+    Where its rest is over for certain: a frame too many tells a speed that is not there. What sinks
+    in a liquid is let go so, too.
+    """
+    early = _first_half(observation)
+    if early is None or (rests_s := rest_s(observation)) is None:
+        return None
+    cost, _ = early.let_go()
+    most = cost + SURE**2 * early.scatter(cost)
+    at = int(np.searchsorted(early.times_s, rests_s))
+    while early.release_cost(float(early.times_s[at])) < most:
+        at += 1
+    return int(np.flatnonzero(observation.mask[0])[at])
 
 
 def on_ramp(observation: Observation) -> Observation:
@@ -90,6 +108,10 @@ class _Way(NamedTuple):
     def scatter(self, cost: float) -> float:
         """The variance of errors over the stated one, at least 1."""
         return max(1.0, cost / max(len(self.times_s) - TERMS, 1))
+
+    def moving(self) -> LinearFit:
+        """What a start in motion makes of it."""
+        return self.fit(np.vander(self.times_s, TERMS, increasing=True))
 
     def release_cost(self, release_s: float) -> float:
         """The least sum of squared errors of a release from rest at an instant."""
