@@ -18,6 +18,7 @@ from galileo_jax.table.grid import cells_of
 from galileo_jax.table.heading import split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
+    each_place_once,
     motion_starts,
     not_pasted,
     unrounded,
@@ -96,6 +97,9 @@ def _table(columns: Columns) -> TrackTable:
     clock = np.arange(places.shape[-1], dtype=float) if clock is None else clock
     if not ids:
         places, said = without_stand_ins(places, lines)
+        warnings += said
+        new, said = each_place_once(places, resolution, lines)
+        clock, places, lines = clock[new], places[..., new], [lines[row] for row in new]
         warnings += said
         places, said = without_copies(clock, places, resolution, lines)
         warnings += said

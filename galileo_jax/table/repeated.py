@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from galileo_jax.table.clock import COMMON_FPS
+from galileo_jax.video.stamps import REPEATED_SHARE, repeats
 
 LEAST_ROWS = 4  # of a motion; after fewer a smaller time is a mistake in the file
 MOST_STEPS = 3.0  # from the first row of a motion to its second
@@ -112,6 +113,33 @@ def not_pasted(
         return new, []
     first, count = lines[int(is_new.argmin())], len(clock) - len(new)
     return new, [f"line {first}: {count} rows are rows of before once more; left out"]
+
+
+def each_place_once(
+    places: np.ndarray, resolution: Sequence[float], lines: Sequence[int]
+) -> tuple[np.ndarray, list[str]]:
+    """The rows, counted from 0, that show something new, and what was done.
+
+    Pictures that are in a film twice have the same place in two rows: the rule for such pictures
+    (`video.stamps`), with the last place printed for a grey level. Of a few that are found here and
+    there `without_copies` knows more.
+
+    Args:
+      places: `[object, axis, row]`, in any unit.
+      resolution: of each axis.
+      lines: of the rows in the file.
+    """
+    steps = np.diff(places / np.reshape(resolution, (-1, 1)), axis=-1)
+    change = np.append(0.0, np.nan_to_num(np.linalg.norm(steps, axis=(0, 1))))
+    is_same = np.append(False, (steps == 0).all(axis=(0, 1)))
+    is_repeat = repeats(change) & is_same
+    new, total = np.flatnonzero(~is_repeat), len(change)
+    if total - len(new) < REPEATED_SHARE * total:
+        return np.arange(total), []
+    often = f", each is there {total // len(new)} times" if total % len(new) == 0 else ""
+    first = lines[int(is_repeat.argmax())]
+    said = f"{total - len(new)} of {total} rows repeat the places of the one before{often}"
+    return new, [f"line {first}: {said}: left out, and row numbers count the others"]
 
 
 def without_copies(
