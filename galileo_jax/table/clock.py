@@ -103,8 +103,10 @@ def _dates(parsed: list[re.Match[str] | None]) -> Numbers:
 
 
 def _from_first(values: np.ndarray, resolution: float) -> Numbers:
-    seen = values[np.isfinite(values)]
-    return Numbers(values - (seen[0] if seen.size else 0.0), resolution)
+    """Seconds from the first one on, over midnight, too."""
+    seen = np.isfinite(values)
+    values[seen] = np.unwrap(values[seen], period=86400.0)
+    return Numbers(values - (values[seen][0] if seen.any() else 0.0), resolution)
 
 
 def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> float | None:

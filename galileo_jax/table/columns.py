@@ -58,7 +58,11 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     has_place = any(one.role in PLACES for one in meanings)
     asked = [n for n, one in enumerate(meanings) if one.role or
              (n in left and not (has_clock and has_place))]  # fmt: skip
-    clocks = {n: clock_times(heading.body, heading.name_of(n), n, fps) for n in asked}
+    # Whatever it is called, a column of dates or of clocks is the time where no other is.
+    tried = (
+        asked if has_clock else sorted({*asked, *(n for n, m in enumerate(meanings) if not m.role)})
+    )
+    clocks = {n: clock_times(heading.body, heading.name_of(n), n, fps) for n in tried}
     clocks = {n: clock for n, clock in clocks.items() if clock is not None}
     for n in clocks:
         meanings[n] = replace(meanings[n], role="time", unit="s")

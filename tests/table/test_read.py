@@ -114,6 +114,10 @@ FORMS = {
         f"{one},{1000 * n * STEP_S + 7:.0f}" for n, one in enumerate(lines())]),
     "a_clock_of_twelve_hours": text("time;x;y", body=clocked(
         lambda n: f"9:31:0{n * 40 // 1000}.{n * 40 % 1000:03d} PM")),
+    "over_midnight": text("t;x;y", body=clocked(lambda n: f"{(23 + (5960 + 4 * n) // 6000) % 24}:"
+                          f"{59 * (n < 10):02d}:{(5960 + 4 * n) % 6000 / 100:05.2f}")),
+    "a_clock_by_any_name": text("Hora;x;y", body=clocked(lambda n: f"09:15:0{n * 40 // 1000}."
+                                                         f"{n * 40 % 1000:03d}")),
     "words_below": text("\tt\tx\ty", body=[f"\t{one}" for one in lines("\t")],
                         after=("", "End of data")),
     "boxes": text("t,x,y,w,h", body=[f"{one},18,19" for one in lines()]),
