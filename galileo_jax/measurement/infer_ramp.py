@@ -30,6 +30,7 @@ MAX_SCATTER_SD_DEG = 2.0  # a path that tells its slope no better does not tell 
 UPPER_SHARE = 0.75  # of the way down; further down the object's front is on the table already
 MIN_POINTS = 5  # on a line, or on either side of a bend
 SHARP = 1 / 3  # of what a parabola leaves: two lines leave less where a path bends at one place
+SEEN_DEG = 0.5  # a path that goes on so nearly in its direction goes on
 OFF_SDS = 4.0  # of the errors: a place that is so far from a line is not on it
 MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
 BEGIN_SHARE, LEAST_BEND = 0.5, 0.01  # of a valley's way; by so many rad its slope changes there
@@ -202,13 +203,13 @@ def _meeting(before: Line, after: Line) -> np.ndarray:
 def end_of_slope(observation: Observation) -> int | None:
     """The last frame before the slope of the first path ends in another; None where it goes on.
 
-    Two straight lines that differ by `MIN_BEND_DEG` and leave a third of what a parabola does: a
-    path that bends all along has no such end.
+    Two straight lines that differ by `SEEN_DEG` and leave a third of what a parabola does: a path
+    that bends all along has no such end.
     """
     frames = np.flatnonzero(observation.mask[0])
     points = observation.position_m[0][:2, frames]
     best = two_lines(points, 2 * MIN_POINTS)
-    if best is None or abs(falls_deg(best[0]) - falls_deg(best[1])) < MIN_BEND_DEG:
+    if best is None or abs(falls_deg(best[0]) - falls_deg(best[1])) < SEEN_DEG:
         return None
     at = best[2]
     # What turns over an edge leaves both lines: each is told by what is far from it.
