@@ -252,6 +252,8 @@ BROKEN = {
                            "in different units: m, mm"),
     "logger_pro_without_y": ("a.csv", broken(LOGGER, "Y (m)", "Q (m)"), "", "no column y"),
     "logger_pro_two_points": ("a.csv", LOGGER, "", "track_name: object1"),
+    "nothing_moves": ("a.csv", "\n".join(["t (s),x (m),y (m)", *(f"{n / 30:.4f},0.3,2" for n in
+                      range(20))]), "", "a.csv: nothing moves: all rows have the same place"),
     "times_stand_still": ("a.csv", broken(LOGGER, "0.250000", "0.200000"), "", "times must"),
     "dlc_without_fps": ("a.csv", DLC, "", "a.yaml: fps: missing; a.csv counts frames"),
     "dlc_never_likely": ("a.csv", broken(DLC, "0.999", "0.1"), DLC_KEYS, "seen in 0 rows"),
