@@ -253,9 +253,13 @@ def _unseen(fit: Fit, gradient: GradientFit, found: Compared, seed: int) -> dict
     progress.report("what could not have been seen", 0.8)
     clips, seen = zip(*((one.clip, one.observation) for one in fit.measurements), strict=True)
     whole = with_library(clips, seen, fit.problem.problems[0].engine.name)
-    whole = whole.with_sizes(fit.problem.sizes)
     if not set(fit.problem.names) <= set(whole.names):
         return {}
-    last = Hypothesis(fit.effects, fit_among(gradient, fit.problem, whole))
-    left = unseen(whole, last, VerdictStakes(whole, is_adequate=True).log_priors_beside(last), seed)
+    exact, sized = whole, whole.with_sizes(fit.problem.sizes)
+    last = Hypothesis(fit.effects, fit_among(gradient, fit.problem, sized))
+    alone = None
+    if fit.exact is not None:
+        alone = Hypothesis(fit.effects, fit_among(fit.exact, fit.problem, exact), exact)
+    log_priors = VerdictStakes(sized, is_adequate=True).log_priors_beside(last)
+    left = unseen(sized, last, log_priors, seed, alone)
     return {key: value for key, value in asdict(left).items() if value}

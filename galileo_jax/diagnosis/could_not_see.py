@@ -20,10 +20,12 @@ are asked for.
 What a free size of imperfections takes up may yet be an effect. By the slopes d to it, the log odds
 of each of its shapes would be, at its best strength,
 
-    -n / 2 log(1 - along^2 / (n |d|^2)) - z^2 / 2 + log sd_z + log prior
+    -n / 2 log(1 - along^2 / (r^2 |d|^2)) - z^2 / 2 + log sd_z + log prior
 
-with `along` the product of d and the residuals; it is in question where the mean over its shapes is
-what the verdict asks for.
+with r the residuals, of which noise alone would leave r^2 = n, and `along` their product with d; it is in question where the mean over its shapes is
+what the verdict asks for. A size that is fitted without the effect is too large beside it, and may
+hide it: so an effect is in question, too, if by its slopes it is so much more probable in an exact
+world than none is in this one, and no other effect is far ahead of it there.
 """
 
 from collections.abc import Mapping
@@ -71,13 +73,22 @@ class Unseen:
 
 
 def unseen(
-    trials: JointProblem, last: Hypothesis, log_priors: Mapping[str, float], seed: int
+    trials: JointProblem,
+    last: Hypothesis,
+    log_priors: Mapping[str, float],
+    seed: int,
+    exact: Hypothesis | None = None,
 ) -> Unseen:
     """Of every effect beside a model: the smallest strength to show, and whether it may be there.
 
-    `last` must describe the clips: else nobody knows their noise. `log_priors` are those of the
-    effects of the library, over that of the model without effects. Nothing is said where the model
-    has parameters of its own, as that of a law.
+    Nothing is said where the model has parameters of its own, as that of a law.
+
+    Args:
+      trials: the clips with all effects.
+      last: describes the clips: else nobody knows their noise.
+      log_priors: of the effects of the library, over that of the model without effects.
+      seed: of the shapes that are tried.
+      exact: the same effects in an exact world, where it is imperfections that describe the clips.
     """
     own = last.of(trials)  # with imperfections, perhaps
     if own.names != trials.names:
@@ -85,8 +96,15 @@ def unseen(
     asked = sorted(set(log_priors) - set(last.effects), key=lambda name: (-log_priors[name], name))
     beside = {name: _Beside.of(own, last, name, log_priors[name], seed) for name in asked}
     needed = _needed_beside(last.fit)
-    in_question = sorted(name for name, one in beside.items() if one.log_odds() >= needed)
-    return Unseen({name: one.entry() for name, one in beside.items()}, tuple(in_question))
+    in_question = {name for name, one in beside.items() if one.log_odds() >= needed}
+    if exact is not None and last.fit.sizes is not None:
+        behind = last.fit.log_evidence - exact.fit.log_evidence
+        alone = (_Beside.of(exact.of(trials), exact, n, log_priors[n], seed) for n in asked)
+        odds = {one.effect: one.log_odds() - behind for one in alone}
+        least = max(needed, max(odds.values(), default=0.0) - DECISIVE)
+        in_question |= {name for name, own in odds.items() if own >= least}
+    entries = {name: one.entry() for name, one in beside.items()}
+    return Unseen(entries, tuple(sorted(in_question)))
 
 
 def _needed_beside(fit: GradientFit) -> float:
@@ -159,7 +177,8 @@ class _Beside:
         z = np.where(is_one, z, 0.0)
         wide = (in_units(own.prior, z + RATE_Z) - in_units(own.prior, z - RATE_Z)) / (2 * RATE_Z)
         num_left = _num_left(self.fit)
-        share = np.minimum(explained(self.along, self.power) / num_left, 1 - 1e-9)
+        left = max(num_left, self.fit.chi2 + self.fit.pull)
+        share = np.minimum(explained(self.along, self.power) / left, 1 - 1e-9)
         odds = -0.5 * num_left * np.log1p(-share) - 0.5 * z**2
         odds -= 0.5 * np.log1p(self.power * (wide / step) ** 2)
         mean = float(logsumexp(np.where(is_one, odds, -np.inf)) - np.log(len(odds)))

@@ -32,6 +32,7 @@ ON_OBJECT = 0.3
 """Sd per axis of a point somewhere on an object, by its size: of a square 1 / sqrt(12)."""
 OUTLINE_AREA = (0.3, 6.0)  # a silhouette's area by that of the outline: a smear makes it larger
 EDGE_PX = 0.03  # sd that sampling a sharp edge with pixels gives the middle of a silhouette
+SMOOTH_DEGREE = 3  # of time: weight, and a drag
 USUAL_SHARE = 0.5  # of a frame's time for which the shutter may be open
 ARM = 0.25  # pixels that come and go at the rim are about this share of the size from the middle
 
@@ -66,7 +67,8 @@ def with_silhouette(
     middle. If a smooth path leads to that from where the texture was last seen (it was held until
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
     they are apart is then an unknown shift of whichever goes less far. Where the two go together,
-    and now nearer, now farther apart, that is an error of the silhouette, too. Of a texture that
+    and now nearer, now farther apart, that is an error of either, as far as its own path is rough:
+    a point on a ball goes round with it. Of a texture that
     hardly moves while a silhouette sets out from it, the first frame alone counts: it is of the
     scene behind.
     """
@@ -107,8 +109,11 @@ def with_silhouette(
         if kept.any():
             apart_px = ON_OBJECT * size
         ways = [way_px(one[both]) for one in (place, found.position_px)] if both.any() else [0.0]
-        if min(ways) > size > np.ptp(ways):  # they go together, and nobody knows which is off
-            slow_px = float(np.hypot(slow_px, 1.4826 * scatter))
+        if min(ways) > size > np.ptp(ways):  # they go together, and one of them is off
+            rough, other = (
+                _off_smooth_px(one[both], clock[both]) for one in (place, found.position_px)
+            )
+            slow_px = float(np.hypot(slow_px, 1.4826 * scatter * rough / np.hypot(rough, other)))
     covariance = np.where(kept[:, None, None], found.covariance_px2, _covariance(place, clock))
     if start.outline.is_round or not is_fixed:
         place = np.where(kept[:, None], found.position_px - middle, place)
@@ -211,6 +216,14 @@ def _is_smoother(
     paths = [(np.where(both[:, None], each, np.nan), none) for each in (place, found.position_px)]
     silhouette, texture = (float(motion_variance([one], clock).sum()) for one in paths)
     return silhouette < texture
+
+
+def _off_smooth_px(place: np.ndarray, clock: np.ndarray) -> float:
+    """What the smoothest path that bends as motions do leaves of one, px, root mean square."""
+    since = (clock - clock.mean()) / np.ptp(clock)
+    left = polynomial(since, place, SMOOTH_DEGREE).left
+    spare = max(len(place) - SMOOTH_DEGREE - 1, 1)
+    return float(np.sqrt(np.sum(left**2) / (2 * spare)) + EDGE_PX)
 
 
 def _covariance(place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "frame 2 2"]:

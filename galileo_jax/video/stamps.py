@@ -36,8 +36,8 @@ def clock_of(stamps_s: Float[np.ndarray, " picture"], tick_s: float) -> Clock:
     number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1))])
     step_s, start_s = np.polyfit(number, stamps_s, 1)
     if np.abs(stamps_s - (start_s + step_s * number)).max() <= tick_s:
-        return Clock(number * step_s, 1 / step_s, True)
-    return Clock(stamps_s - stamps_s[0], (len(stamps_s) - 1) / np.ptp(stamps_s), False)
+        return Clock(number * step_s, float(1 / step_s), True)
+    return Clock(stamps_s - stamps_s[0], float((len(stamps_s) - 1) / np.ptp(stamps_s)), False)
 
 
 def at_declared_rate(clock: Clock, fps: float) -> tuple[Clock, float]:

@@ -218,6 +218,26 @@ def test_a_silhouette_that_goes_to_and_fro_about_the_texture_is_no_better_known_
     assert (track.shifts_px[:, 0, 0] > 2.0).all(), "rms of what it is off by: 2.1 px"
 
 
+def test_a_texture_that_goes_round_does_not_make_the_silhouette_uncertain():
+    """A ball that turns in the air: 8 px, of which all are the texture's."""
+    time = np.arange(50.0)
+    middle = np.stack([20 + 8 * time, 400 - 14 * time + 0.2 * time**2], axis=1)
+    round_it = 8.0 * np.stack([np.cos(0.2 * time), np.sin(0.2 * time)], axis=1)
+    texture = np.where(time[:, None] < 42, middle + round_it, np.nan)
+    path, rng = Path([], [], []), np.random.default_rng(2)
+    for index, place in enumerate(middle + 0.2 * rng.standard_normal(middle.shape)):
+        path.append(index, float(index), Part(place, 900.0, place - 15, place + 15))
+    none = np.where(np.isfinite(texture[:, 0]), 0.0, np.nan)
+    square = none[:, None, None] + np.zeros((50, 2, 2))
+    found = Finished(texture, square + 1e-3 * np.eye(2), square, square, none)
+    start = Start("ball", (28.0, 400.0), Outline((30.0, 30.0)))
+    track = with_silhouette(found, start, [path], time)
+    assert np.isfinite(track.angle_rad).all()
+    assert (track.shifts_px[:, 0, 0] < 1.0).all()
+    off = track.position_px - middle
+    np.testing.assert_allclose(off, np.broadcast_to(off.mean(axis=0), off.shape), atol=1.0)
+
+
 def test_a_mark_that_goes_round_tells_the_middle():
     """Its path is as smooth as the silhouette's, whose scatter is larger."""
     time = np.arange(50.0)
