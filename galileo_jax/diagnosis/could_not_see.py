@@ -45,6 +45,7 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.score_tests import (
     SHOWS,
     explained,
+    misfit,
     shapes_beside,
     slopes_along,
     strength_of,
@@ -177,7 +178,7 @@ class _Beside:
         z = np.where(is_one, z, 0.0)
         wide = (in_units(own.prior, z + RATE_Z) - in_units(own.prior, z - RATE_Z)) / (2 * RATE_Z)
         num_left = _num_left(self.fit)
-        left = max(num_left, self.fit.chi2 + self.fit.pull)
+        left = max(num_left, misfit(self.trials, self.fit))
         share = np.minimum(explained(self.along, self.power) / left, 1 - 1e-9)
         odds = -0.5 * num_left * np.log1p(-share) - 0.5 * z**2
         odds -= 0.5 * np.log1p(self.power * (wide / step) ** 2)

@@ -85,6 +85,13 @@ def slopes_along(
     return _along(base, *_changes(trials, base, probes))
 
 
+def misfit(trials: JointProblem, base: GradientFit) -> float:
+    """The squared residuals of a fit, whitened, and its pulls: what slopes explain a part of."""
+    theta, free = trials.theta(base.z, base.free), base.free[: len(trials.model_parameters)]
+    white = trials.whitened(theta[None], theta[len(free) :])
+    return float(sum(np.sum(one**2) for one in white) + np.sum(base.z[: len(free)][free] ** 2))
+
+
 def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
     """How much of the squared residuals each slope explains; none where it does not show."""
     return np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
