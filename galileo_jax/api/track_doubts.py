@@ -104,7 +104,7 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     they_were = "it was" if len(exact) == 1 else "they were"
     return (
         f"{text}. If {they_were} read off the picture, half a pixel at either end of a line as "
-        f"long as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
+        f"long as object 1's way ({way_px:.0f} px) would change k1 by {by}: declare "
         f"{keys} to include that in its interval"
     )
 

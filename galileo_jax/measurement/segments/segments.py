@@ -158,9 +158,11 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         # Before other ends are looked for: a clock that changes looks like a blow.
         last = change[0] - (EXPOSED_FRAMES if kept.observation.is_tracked_here else 0)
         kept = kept.cut("after", last, CHANGES_RATE.format(change[1]))
-    kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if scenario.has_ramp and scenario.angle_deg == 0:
-        return kept.cut("before", handling.pushed_frame(kept.observation), PUSHED)
+        # A short push is a blow, too, and no end.
+        kept = kept.cut("before", handling.pushed_frame(kept.observation), PUSHED)
+        return kept.cut("after", *_end_of_one(clip, kept.observation))
+    kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
         return kept.cut("before", handling.thrown_frame(kept.observation, rest_belongs), HELD)
