@@ -203,28 +203,34 @@ def _meeting(before: Line, after: Line) -> np.ndarray:
 def end_of_slope(observation: Observation) -> int | None:
     """The last frame before the slope of the first path ends in another; None where it goes on.
 
-    Two straight lines that differ by `SEEN_DEG` and leave a third of what a parabola does: a path
-    that bends all along has no such end.
+    Two straight lines that differ by `SEEN_DEG`, and clearly, and leave a third of what a parabola
+    does: a path that bends all along has no such end, nor what rests before it goes.
     """
     frames = np.flatnonzero(observation.mask[0])
     points = observation.position_m[0][:2, frames]
+    lasting = np.sum(observation.lasting_m[:, 0][..., frames] ** 2, axis=(0, 1)) / 2
+    variance = observation.variance_m2[0, frames] + lasting
     best = two_lines(points, 2 * MIN_POINTS)
-    if best is None or abs(falls_deg(best[0]) - falls_deg(best[1])) < SEEN_DEG:
+    if best is None:
         return None
-    at = best[2]
     # What turns over an edge leaves both lines: each is told by what is far from it.
-    parts = points[:, : at - at // 4], points[:, at + (len(frames) - at) // 4 :]
-    lines = [line_through(part) for part in parts]
-    left = np.sqrt([line.spread[0] / part.shape[1] for line, part in zip(lines, parts, strict=True)])
+    at = best[2]
+    sides = slice(at - at // 4), slice(at + (len(frames) - at) // 4, None)
+    lines = [line_through(points[:, side]) for side in sides]
+    off_m, known_deg = [], []
+    for line, side in zip(lines, sides, strict=True):
+        own = variance[side]
+        off_m.append(math.sqrt(line.spread[0] / len(own) + float(np.median(own))))
+        known_deg.append(math.degrees(off_m[-1] / math.sqrt(max(line.spread[1], 1e-30))))
+    bend_deg = abs(falls_deg(lines[0]) - falls_deg(lines[1]))
     whole = line_through(points)
     along, across = np.stack([whole.along, whole.across]) @ (points - whole.middle[:, None])
-    bent = polynomial(along, across, 2).left
-    if left.max() > SHARP * math.sqrt(float(np.mean(bent**2))):
+    bent_m = math.sqrt(float(np.mean(polynomial(along, across, 2).left ** 2)))
+    if bend_deg < max(SEEN_DEG, OFF_SDS * math.hypot(*known_deg)) or max(off_m) > SHARP * bent_m:
         return None
-    sd_m = max(math.sqrt(float(np.median(observation.variance_m2[0, frames]))), float(left[0]))
-    off = np.abs(lines[0].across @ (points - lines[0].middle[:, None]))
-    is_off = (off > OFF_SDS * sd_m) & (np.arange(len(frames)) >= parts[0].shape[1])
-    return int(frames[int(np.argmax(is_off)) - 1]) if is_off.any() else None
+    far = np.abs(lines[0].across @ (points - lines[0].middle[:, None])) > OFF_SDS * off_m[0]
+    far[sides[0]] = False
+    return int(frames[int(np.argmax(far)) - 1]) if far.any() else None
 
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
