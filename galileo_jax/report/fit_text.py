@@ -22,10 +22,10 @@ MEANINGS = {  # by name; of those with a number in them, by pattern
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
     "gravity": "acceleration of free fall",
-    "start_velocity_x": "velocity in the first frame, along the travel",
-    "start_velocity_y": "velocity in the first frame, upward",
-    "start_speed": "speed in the first frame",
-    "start_angle": "angle at the start (a throw: above the level; a thread: from the plumb line)",
+    "start_velocity_x": "velocity at the start, along the travel",
+    "start_velocity_y": "velocity at the start, upward",
+    "start_speed": "speed at the start",
+    "start_angle": "angle at the start",
     "floor_restitution": "share of the speed left after a bounce",
     "floor_height": "height of the centre at a bounce",
     "floor_grip": "share of the speed along the floor that is lost in a bounce",
@@ -62,6 +62,7 @@ OUTSIDE = {  # what nuisances mean that are far from what is usual
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD = 0.7
 TOLD_FACTOR = 10.0  # an interval that spans more tells no size
+TOLD_SHARE = 0.1  # of what is left, root mean square
 SMALL = 0.01  # of a metre or a second: smaller sizes are said in thousandths
 # Residuals of the noise's size may still follow a pattern that noise does not have.
 PATTERNS = "galileo compare tests whether it has a pattern"
@@ -167,7 +168,7 @@ def fit_quality(result: Mapping[str, Any]) -> list[str]:
     near = distance_text(result["error"])
     said = [near] if near else []
     if "imperfections" in result:
-        said += imperfection_text(result["imperfections"])
+        said += imperfection_text(result["imperfections"], result["error"])
     elif not result.get("no_verdict"):
         said.append(_of_chi2(result["error"]))
     said += map(pull_text, result.get("pulls", []))
@@ -183,16 +184,20 @@ def fit_quality(result: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def imperfection_text(found: Mapping[str, Any]) -> list[str]:
-    """What of imperfections shows, and whether it is usual: a sentence for each."""
-    said = []
+def imperfection_text(found: Mapping[str, Any], error: Mapping[str, Any]) -> list[str]:
+    """What of imperfections shows, and whether it is usual: a sentence for each.
+
+    `error`: of result.json. An error of the marks that is far less than what is left says nothing.
+    """
+    said, least_m = [], TOLD_SHARE * 1e-3 * (error.get("rms_mm") or 0.0)
     for entry in found.values():
         shows = entry["q975"] < TOLD_FACTOR * entry["q025"]
+        shows &= entry["unit"] != "m" or entry["mean"] > least_m
         if shows or not entry["ordinary"]:
             size = _size_text(entry["mean"], unit_text(entry))
             usual = "as is usual" if entry["ordinary"] else "which is more than usual"
             said.append(sentence(f"{entry['meaning'].format(size=size)}, {usual}"))
-    return said or ["How large each imperfection is does not show."]
+    return said or ["What is left may be the marks', the times' or the surfaces': all as is usual."]
 
 
 def _size_text(size: float, unit: str) -> str:

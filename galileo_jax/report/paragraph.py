@@ -46,7 +46,7 @@ def paragraph(
     body = BODIES.get(shapes[0], "body") if shapes else "body"
     status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
     model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
-    near = ", ".join(nearness(result["error"]))
+    near, found = ", ".join(nearness(result["error"])), result.get("imperfections")
     is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [
         _frictions(known, body, shapes),
@@ -54,7 +54,7 @@ def paragraph(
         _values(rest),
         _unknown([name for name in entries if name not in known], known),
         f"The model{model} follows the motion to {near}." if near else "",
-        *(imperfection_text(found) if (found := result.get("imperfections")) else []),
+        *(imperfection_text(found, result["error"]) if found else []),
         _verdict(result, check, diagnosis),
         "" if status == "law" else _values(effects),  # the law's text has them
         f"All values are those with {_all(result)}." if is_in_doubt else "",

@@ -74,7 +74,7 @@ def test_what_is_not_determined_is_said_and_is_given_no_value():
         ),
         (
             {"start_velocity_x": entry(2.0, 0.1, "m/s"), "period": entry(1.0, 0.01, "s")},
-            "The velocity in the first frame, along the travel, is 2.00 ± 0.10 m/s; the period of "
+            "The velocity at the start, along the travel, is 2.00 ± 0.10 m/s; the period of "
             "the swing without damping is 1.000 ± 0.010 s. ",
         ),
         ({}, "The model follows "),
@@ -178,4 +178,12 @@ def test_frames_are_told_where_no_distance_is_known():
 def test_small_sizes_are_said_in_thousandths(size, said):
     found = {"brief_error": entry(size, 0.0) | {"unit": "m", "meaning": "off by {size}"}}
     found["brief_error"] |= {"ordinary": False}
-    assert imperfection_text(found) == [f"Off by {said}, which is more than usual."]
+    assert imperfection_text(found, {}) == [f"Off by {said}, which is more than usual."]
+
+
+@pytest.mark.parametrize(("size_m", "is_told"), [(3e-4, False), (6e-4, True)])
+def test_an_error_of_the_marks_far_below_what_is_left_is_not_told(size_m, is_told):
+    sizes = {"mean": size_m, "q025": 0.8 * size_m, "q975": 1.2 * size_m, "unit": "m"}
+    found = {"lasting_error": {**sizes, "ordinary": True, "meaning": "the marks are off by {size}"}}
+    (said,) = imperfection_text(found, {"rms_mm": 5.0})
+    assert ("The marks are off by" in said) == is_told

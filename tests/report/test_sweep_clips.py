@@ -70,7 +70,7 @@ def test_a_motion_without_friction_shows_what_it_determines():
     flight["parameters"] = {"m1": UNKNOWN, "start_speed": speed, "start_angle": UNKNOWN}
     text = clips_section([ClipRow("a", fit=flight)])
     assert 'data-label="start_speed">3.500 m/s <span class="soft">' in text
-    assert "start_angle" not in text and "start_speed: speed in the first frame" in text
+    assert "start_angle" not in text and "start_speed: speed at the start" in text
 
 
 def test_a_point_estimate_has_no_standard_deviation():
