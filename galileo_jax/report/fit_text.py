@@ -197,7 +197,7 @@ def imperfection_text(found: Mapping[str, Any], error: Mapping[str, Any]) -> lis
             size = _size_text(entry["mean"], unit_text(entry))
             usual = "as is usual" if entry["ordinary"] else "which is more than usual"
             said.append(sentence(f"{entry['meaning'].format(size=size)}, {usual}"))
-    return said or ["What is left may be the marks', the times' or the surfaces': all as is usual."]
+    return said
 
 
 def _size_text(size: float, unit: str) -> str:

@@ -185,5 +185,4 @@ def test_small_sizes_are_said_in_thousandths(size, said):
 def test_an_error_of_the_marks_far_below_what_is_left_is_not_told(size_m, is_told):
     sizes = {"mean": size_m, "q025": 0.8 * size_m, "q975": 1.2 * size_m, "unit": "m"}
     found = {"lasting_error": {**sizes, "ordinary": True, "meaning": "the marks are off by {size}"}}
-    (said,) = imperfection_text(found, {"rms_mm": 5.0})
-    assert ("The marks are off by" in said) == is_told
+    assert bool(imperfection_text(found, {"rms_mm": 5.0})) == is_told
