@@ -39,6 +39,7 @@ DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half 
 SPIN_SD_RAD_S, SPIN_SD_SHARE = 3.0, 0.03  # as a camera that looks at the ball's marks tells it
 LAUNCH_SD_DEG = 0.5  # a launcher is set by a scale of degrees
 UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
+MARK_PX = 5.0  # from a bob's middle, as a click may be, or a middle beside a hand
 LENGTH_SD, ANGLE_SD_RAD = 0.3, 0.15  # of a thread's logarithm; of what the path tells
 SPEED_SD = 0.3  # of the speed of a fall through the length
 TAPE_M, PLACE_M = 0.002, 0.01  # how well a thread, and a pivot in the picture, are measured
@@ -72,7 +73,12 @@ def expected(
         return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
 
     if PENDULUM in SCENARIOS[clip.scenario].laws:
-        return declared | _pendulum(clip, times_s, place_m, velocity)
+        pendulum = _pendulum(clip, times_s, place_m, velocity)
+        return (
+            declared
+            | pendulum
+            | (_mark_off_thread(clip, pendulum) if observation.is_tracked_here else {})
+        )
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),
@@ -205,6 +211,18 @@ def _pendulum(
         ANGLE: (angle, angle_sd),
         "start_speed": (along * length / radius, SPEED_SD * fall),
     }
+
+
+def _mark_off_thread(
+    clip: Clip, pendulum: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """How far the picture's vertical may seem to be off, where a mark on the bob was followed.
+
+    What is beside the thread's line turns with the thread: by so much the plumb line seems turned.
+    """
+    scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
+    aside_rad = MARK_PX / (scale * pendulum[LENGTH][0])
+    return {DeclaredAngle.name: (0.0, math.hypot(math.radians(clip.vertical_sd_deg), aside_rad))}
 
 
 def _density_ratio(clip: Clip) -> tuple[float, float]:

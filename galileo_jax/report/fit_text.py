@@ -41,7 +41,7 @@ MEANINGS = {  # by name; of those with a number in them, by pattern
     "density_ratio": "density of the liquid over the object's",
     "liquid_drag": "drag constant c of c v|v|",
     "terminal_speed": "speed at which drag and weight balance",
-    "declared_angle": "ramp's angle, minus the declared one",
+    "declared_angle": "angle of the ramp or the vertical, minus the declared one",
     "declared_scale": "relative error of the scale: lengths are measured too long by this share",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
