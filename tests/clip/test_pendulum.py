@@ -1,6 +1,7 @@
 """Pendulums: the elliptic closed form, dry friction, a thread that stretches, simulate and fit."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -219,3 +220,15 @@ def test_a_fit_finds_what_was_hidden(effect, tmp_path):
     for name, true in made.truths[0]["parameters"].items():
         told = found.result["parameters"][name]
         assert abs(told["mean"] - true) < 4 * told["sd"], name
+
+
+def test_a_mark_beside_the_thread_turns_the_plumb_line(tmp_path):
+    """Of a film: what is 5 px aside seems 5 px over the thread's length out of plumb."""
+    table = problem_of(tmp_path, 0.4)
+    clip = load_clip(tmp_path / "swing.csv").model_copy(update={"pixels_per_metre": 500.0})
+    filmed = replace(read_observation_csv(tmp_path / "swing.csv"), noise_known_to=0.15)
+    found = build_scene(clip, filmed).surroundings.expected["declared_angle"]
+    assert found == pytest.approx((0.0, 5 / (500 * L)), rel=0.02)
+    assert "declared_angle" not in table.model.scene.surroundings.expected
+    fitted = make_problem(clip, filmed, "auto", make_effects(()))
+    assert "declared_angle" in [parameter.name for parameter in fitted.parameters]
