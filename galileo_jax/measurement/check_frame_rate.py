@@ -66,7 +66,9 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         nearest = 2 * min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
         words, off = unit
         is_nearer = off < CLEARLY_NEARER * nearest
-        likely = f"likely {words}" if is_nearer else f"{likely} (or {words})"
+        # Who writes times beside places has seldom got these wrong.
+        first, second = (f"likely {words}", likely) if found.is_least else (likely, words)
+        likely = f"likely {words}" if is_nearer else f"{first} (or {second.removeprefix('likely ')})"
     name, more = observation.names[0], "at least " if found.is_least else ""
     error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (

@@ -161,4 +161,4 @@ def test_a_level_table_in_centimetres(per_metre, is_said, tmp_path):
     clip, seen = table(tmp_path, {"scenario": "level"}, t, place)
     doubt = frame_rate_doubt(clip, seen)
     assert (doubt is not None) == is_said
-    assert doubt is None or "(or track_units: cm | mm | in)" in doubt
+    assert doubt is None or "likely track_units: cm | mm | in (or fps: 24 or less)" in doubt
