@@ -142,7 +142,9 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     seen = np.isfinite(table.position).all(axis=1).any(axis=0)
     moves = np.fmax.reduce(table.position, axis=-1) > np.fmin.reduce(table.position, axis=-1)
     if seen.any() and not moves.any():
-        raise of.wrong("nothing moves: all rows have the same place; was the right column exported?")
+        raise of.wrong(
+            "nothing moves: all rows have the same place; was the right column exported?"
+        )
     first = int(seen.argmax())  # 0, where none was seen
     as_read = times[first:] - times[first]
     table = replace(table, position=table.position[..., first:])

@@ -102,8 +102,8 @@ def told_noise_m(name: str, times_s: np.ndarray, position_m: np.ndarray) -> floa
 
 def _too_few(name: str, rows: str) -> InputError:
     return InputError(
-        f"{name}: {rows} expected) to tell how large its errors are; our own csv may state them, in "
-        f"a column {name}_sd_m"
+        f"{name}: {rows} expected) to tell how large its errors are; our own csv may state them, "
+        f"in a column {name}_sd_m"
     )
 
 

@@ -22,10 +22,11 @@ of each of its shapes would be, at its best strength,
 
     -n / 2 log(1 - along^2 / (r^2 |d|^2)) - z^2 / 2 + log sd_z + log prior
 
-with r the residuals, of which noise alone would leave r^2 = n, and `along` their product with d; it is in question where the mean over its shapes is
-what the verdict asks for. A size that is fitted without the effect is too large beside it, and may
-hide it: so an effect is in question, too, if by its slopes it is so much more probable in an exact
-world than none is in this one, and no other effect is far ahead of it there.
+with r the residuals, of which noise alone would leave r^2 = n, and `along` their product with d; it
+is in question where the mean over its shapes is what the verdict asks for. A size that is fitted
+without the effect is too large beside it, and may hide it: so an effect is in question, too, if by
+its slopes it is so much more probable in an exact world than none is in this one, and no other
+effect is far ahead of it there.
 """
 
 from collections.abc import Mapping

@@ -68,7 +68,9 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         is_nearer = off < CLEARLY_NEARER * nearest
         # Who writes times beside places has seldom got these wrong.
         first, second = (f"likely {words}", likely) if found.is_least else (likely, words)
-        likely = f"likely {words}" if is_nearer else f"{first} (or {second.removeprefix('likely ')})"
+        likely = (
+            f"likely {words}" if is_nearer else f"{first} (or {second.removeprefix('likely ')})"
+        )
     name, more = observation.names[0], "at least " if found.is_least else ""
     error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (

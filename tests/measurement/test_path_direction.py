@@ -87,7 +87,9 @@ def level(
     speed = np.where(t < push_s, 0.9 * t / max(push_s, 1e-9), 0.9 - K1 * G * (t - push_s))
     x = np.concatenate([[0.0], np.cumsum(np.clip(speed, 0, None))[:-1]]) / 100
     noise = np.random.default_rng(4).standard_normal((2, 160)) * [[NOISE_M], [noise_y_m]]
-    rows = [f"{a},{b},{c},{NOISE_M}" for a, b, c in zip(t + rest_s, x + noise[0], noise[1], strict=True)]
+    rows = [
+        f"{a},{b},{c},{NOISE_M}" for a, b, c in zip(t + rest_s, x + noise[0], noise[1], strict=True)
+    ]
     head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
     (folder / "run.csv").write_text("\n".join([head, *rows]) + "\n")
     path = folder / "run.yaml"

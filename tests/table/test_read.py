@@ -131,7 +131,7 @@ def test_every_form_is_the_same_throw(content: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("title", "unit"), [("Vinkel (°)", np.pi / 180), ("kąt / deg", np.pi / 180), ("açı (rad)", 1.0)]
+    ("title", "unit"), [("Vinkel (°)", np.pi / 180), ("kąt / deg", np.pi / 180), ("góc (rad)", 1.0)]
 )
 @pytest.mark.parametrize("clock", ["Tid (s)", "t (s)"])
 def test_what_is_in_degrees_is_an_angle(

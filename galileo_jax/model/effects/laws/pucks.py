@@ -20,7 +20,16 @@ and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int
 Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase flow (impact).
 """
 
-from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter, Rims, Role, Uniform, by_object
+from galileo_jax.model.effects import (
+    Effect,
+    LogNormal,
+    Normal,
+    Parameter,
+    Rims,
+    Role,
+    Uniform,
+    by_object,
+)
 
 # In `Surroundings.expected`: how well places relative to each other are known.
 OFFSET = "hit_offset"
