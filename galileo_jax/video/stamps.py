@@ -12,6 +12,7 @@ LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
 """Fewer, or less of the pictures in which something moves, may be the turn of a swing; 24 a second
 stored as 30 repeat one in five."""
 SUDDEN = 0.6  # of what a picture changes by: those before a repeat, and after it, are so alike
+TURN = 0.9  # of it: what changes by less than that towards a picture, and more after it, turns there
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
 FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
 AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
@@ -86,15 +87,15 @@ def _is_sudden(
 ) -> Bool[np.ndarray, " picture"]:
     """Whether pictures right before a run of repeats change by much and alike, and those after.
 
-    At the turn of a swing they change less and less, and then more and more.
+    At the turn of a swing they change less and less, and then more and more, both.
     """
     found, fresh = np.zeros(len(change), bool), np.flatnonzero(~is_repeat)
     for index in np.flatnonzero(is_repeat):
         at = int(np.searchsorted(fresh, index))
         before, after = change[fresh[max(at - 2, 0) : at]], change[fresh[at : at + 2]]
         least = max(SUDDEN * before.max(initial=0.0), change[index] / REPEATED, LEAST_CHANGE_GREY)
-        is_whole = len(before) == len(after) == 2
-        found[index] = is_whole and min(before.min(), after.min()) > least
+        if len(before) == len(after) == 2 and min(before.min(), after.min()) > least:
+            found[index] = before[1] > TURN * before[0] or after[0] > TURN * after[1]
     return found
 
 

@@ -60,6 +60,16 @@ def test_repeats_of_pictures() -> None:
     assert not repeats(changes(*[2.0, 0.1] * 20)).any()  # noise
 
 
+@pytest.mark.parametrize(
+    ("beside", "is_repeat"), [((62.0, 41.0), False), ((88.0, 84.0), True), ((41.0, 62.0), True)]
+)
+def test_a_turn_is_no_repeat(beside: tuple[float, float], is_repeat: bool) -> None:
+    """A pendulum turns within one step: a picture like the one before, and less and less before."""
+    steady = np.full(20, 95.0)
+    change = np.concatenate([steady, beside, [3.0], beside[::-1], steady])
+    assert repeats(change).any() == is_repeat
+
+
 def test_pale_ends() -> None:
     contrast = np.array([0, 3, 9, 10, 2, *[10.0] * 5, 4, 1])
     assert np.flatnonzero(is_blank(contrast)).tolist() == [0, 1, 10, 11]
