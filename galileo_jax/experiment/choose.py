@@ -79,11 +79,17 @@ def best_first(expected: Sequence[Expected]) -> tuple[Expected, ...]:
 
 
 def default_can(clip: Clip, trials: JointProblem) -> dict[str, Any]:
-    """What nearly every lab allows: lower and higher; flatter and steeper."""
+    """What nearly every lab allows: lower and higher; flatter and steeper; more frames.
+
+    Not lower and higher where the foot of a board is not known.
+    """
+    can: dict[str, Any] = {"fps": [clip.fps, 2 * clip.fps, 4 * clip.fps]}
     if not SCENARIOS[clip.scenario].has_ramp and clip.scenario != "fall":
-        return {"fps": [clip.fps, 2 * clip.fps, 4 * clip.fps]}
+        return can
     height = height_m(clip, trials.problems[0])
-    can: dict[str, Any] = {"height": (round(0.4 * height, 3), round(2.0 * height, 3))}
+    low, high = round(0.4 * height, 3), round(2.0 * height, 3)
+    if 0 < low < high:
+        can = {"height": (low, high)}
     if clip.ramp_angle_deg is not None:
         flat, steep = max(5.0, clip.ramp_angle_deg - 8), min(45.0, clip.ramp_angle_deg + 8)
         can["angle"] = (round(flat, 1), round(steep, 1))

@@ -8,10 +8,15 @@ import pytest
 
 from galileo_jax.api.diagnose import Diagnosis
 from galileo_jax.api.next_experiment import next_experiment
-from galileo_jax.experiment.choose import best_first, expect, with_next
+from galileo_jax.assembly.build_problem import make_problem
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.experiment.choose import best_first, default_can, expect, with_next
 from galileo_jax.experiment.hypothesis_probabilities import beliefs_of, read_beliefs, write_beliefs
 from galileo_jax.experiment.predicted_experiment import predict_experiment
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
+from galileo_jax.experiment.settings import parse_can
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.runtime.errors import InputError
 from tests.found import diagnosis_of, make_trials
@@ -173,3 +178,24 @@ def test_hypotheses_that_no_experiment_can_tell_apart(found, trials, clip):
     )
     (one,) = expect(clip, trials, twins, [{"height": 0.2}])
     assert one.gain_nats == pytest.approx(0.0, abs=1e-6) and one.named == 0.0
+
+
+@pytest.mark.parametrize(("foot", "first"), [((0.0, 0.0), "fps"), ((0.6, -0.25), "height")])
+def test_no_height_is_proposed_where_the_foot_is_not_known(foot, first, tmp_path):
+    """A board whose places are counted from where its object is first seen: it starts below it."""
+    times = np.arange(30) / 60
+    gone = 0.5 * 1.8 * times**2
+    rows = [
+        f"{t},{s * math.cos(0.4) - foot[0]},{-0.004 - s * math.sin(0.4) - foot[1]},0.0005"
+        for t, s in zip(times, gone, strict=True)
+    ]
+    path = tmp_path / "board.csv"
+    path.write_text("\n".join(["time_s,block_x_m,block_y_m,block_sd_m", *rows]))
+    path.with_suffix(".yaml").write_text(
+        "track: board.csv\nscenario: incline\nramp_angle_deg: 22.918\n"
+        "objects: [{name: block, shape: box}]\n"
+    )
+    clip = load_clip(path)
+    trials = JointProblem((make_problem(clip, read_observation_csv(path), "auto", ()),))
+    can = parse_can(default_can(clip, trials))
+    assert next(iter(can)) == first and "angle" in can
