@@ -12,7 +12,7 @@ LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
 """Fewer, or less of the pictures in which something moves, may be the turn of a swing; 24 a second
 stored as 30 repeat one in five."""
 SUDDEN = 0.6  # of what a picture changes by: those before a repeat, and after it, are so alike
-TURN = 0.9  # of it: what changes by less than that towards a picture, and more after it, turns there
+TURN = 0.9  # of it: what changes by less towards a picture, and by more after it, turns there
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
 FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
 AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
