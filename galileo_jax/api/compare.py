@@ -258,7 +258,7 @@ def _unseen(fit: Fit, gradient: GradientFit, found: Compared, seed: int) -> dict
     exact, sized = whole, whole.with_sizes(fit.problem.sizes)
     last = Hypothesis(fit.effects, fit_among(gradient, fit.problem, sized))
     alone = None
-    if fit.exact is not None:
+    if fit.exact is not None and fit.exact.code is not Code.FAILED:
         alone = Hypothesis(fit.effects, fit_among(fit.exact, fit.problem, exact), exact)
     log_priors = VerdictStakes(sized, is_adequate=True).log_priors_beside(last)
     left = unseen(sized, last, log_priors, seed, alone)

@@ -30,6 +30,7 @@ MAX_SCATTER_SD_DEG = 2.0  # a path that tells its slope no better does not tell 
 UPPER_SHARE = 0.75  # of the way down; further down the object's front is on the table already
 MIN_POINTS = 5  # on a line, or on either side of a bend
 SHARP = 1 / 3  # of what a parabola leaves: two lines leave less where a path bends at one place
+MOST_POINTS = 500  # among which a bend is looked for
 SEEN_DEG = 0.5  # a path that goes on so nearly in its direction goes on
 OFF_SDS = 4.0  # of the errors: a place that is so far from a line is not on it
 MIN_BEND_DEG = 4.0  # a path that bends by less shows no foot
@@ -207,6 +208,7 @@ def end_of_slope(observation: Observation) -> int | None:
     does: a path that bends all along has no such end, nor what rests before it goes.
     """
     frames = np.flatnonzero(observation.mask[0])
+    frames = frames[:: -(-len(frames) // MOST_POINTS) or 1]
     points = observation.position_m[0][:2, frames]
     lasting = np.sum(observation.lasting_m[:, 0][..., frames] ** 2, axis=(0, 1)) / 2
     variance = observation.variance_m2[0, frames] + lasting

@@ -65,10 +65,10 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
     every second, third, ... picture alone is new, that holds for the whole film.
     """
     count = len(change)
-    least = np.zeros(count)
-    for index in range(1, count - 1):
-        before = change[max(1, index - NEAR_FRAMES) : index].max(initial=0.0)
-        least[index] = min(before, change[index + 1 : index + 1 + NEAR_FRAMES].max())
+    known = np.pad(np.where(np.arange(count) > 0, change, 0.0), NEAR_FRAMES)
+    most = np.lib.stride_tricks.sliding_window_view(known, NEAR_FRAMES).max(axis=1)
+    least = np.minimum(most[:count], most[NEAR_FRAMES + 1 :])  # before it, and after
+    least[[0, -1]] = 0.0
     is_moving = least > LEAST_CHANGE_GREY
     is_repeat = is_moving & (change < REPEATED * least)
     if is_repeat.sum() < max(LEAST_REPEATS, REPEATED_SHARE * is_moving.sum()):

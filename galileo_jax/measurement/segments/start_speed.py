@@ -79,10 +79,9 @@ def let_go_frame(observation: Observation) -> int | None:
         return None
     cost, _ = early.let_go()
     most = cost + SURE**2 * early.scatter(cost)
-    at = int(np.searchsorted(early.times_s, rests_s))
-    while early.release_cost(float(early.times_s[at])) < most:
-        at += 1
-    return int(np.flatnonzero(observation.mask[0])[at])
+    later = range(int(np.searchsorted(early.times_s, rests_s)), len(early.times_s))
+    at = next((i for i in later if early.release_cost(float(early.times_s[i])) > most), None)
+    return None if at is None else int(np.flatnonzero(observation.mask[0])[at])
 
 
 def on_ramp(observation: Observation) -> Observation:
