@@ -125,7 +125,8 @@ def _in_declared_order(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable
     by_name = {_plain(name): index for index, name in enumerate(table.names)}
     wanted = [item.track_name or item.name for item in of.file.objects]
     order = [by_name[_plain(name)] for name in wanted if _plain(name) in by_name]
-    has = ", ".join(table.names)
+    seen = np.isfinite(table.position).all(axis=1).sum(axis=-1)
+    has = ", ".join(f"{name} ({rows} rows)" for name, rows in zip(table.names, seen, strict=True))
     for item in of.file.objects:
         if item.track_name is not None and _plain(item.track_name) not in by_name:
             raise of.wrong_key(
