@@ -74,7 +74,11 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
 
 
 def _sign(values: np.ndarray) -> int:
-    """That of most of the values; 0 where it is not clear."""
+    """That of most of the values that are not far below the usual one; 0 where it is not clear.
+
+    What rests, or what a track has leapt to, adds values about 0.
+    """
+    values = values[np.abs(values) >= 0.5 * np.median(np.abs(values))] if values.size else values
     if not values.size:
         return 0
     share = float((values > 0).mean())

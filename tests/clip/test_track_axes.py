@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_axes import up_from_motion
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from galileo_jax.runtime.errors import InputError
@@ -140,3 +141,14 @@ def test_a_spring_that_swings_along_x_and_wobbles(tmp_path: Path) -> None:
         tmp_path, {"t (s)": times, "x (m)": swing, "y (m)": wobble}, "scenario: spring"
     )
     assert abs(np.corrcoef(found.position_m[0, 1], swing)[0, 1]) > 0.999
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_a_track_leaps_to_does_not_hide_which_way_is_up(seed: int, sign: float) -> None:
+    """A fall of 0.4 s, and then something else that rests."""
+    times = np.arange(40) / 60
+    height = np.where(times < 0.42, 1.4 - 4.905 * np.clip(times - 0.03, 0, None) ** 2, 0.66)
+    place = np.stack([np.where(times < 0.42, 0.2, 0.83), sign * height])
+    place += np.random.default_rng(seed).normal(0, 1e-3, place.shape)
+    assert up_from_motion("bend", times, place) == ("up" if sign > 0 else "down")
