@@ -222,7 +222,7 @@ def end_of_slope(observation: Observation) -> int | None:
     off_m, known_deg = [], []
     for line, side in zip(lines, sides, strict=True):
         own = variance[side]
-        off_m.append(math.sqrt(line.spread[0] / len(own) + float(np.median(own))))
+        off_m.append(math.sqrt(max(line.spread[0] / len(own), float(np.median(own)))))
         known_deg.append(math.degrees(off_m[-1] / math.sqrt(max(line.spread[1], 1e-30))))
     bend_deg = abs(falls_deg(lines[0]) - falls_deg(lines[1]))
     whole = line_through(points)
@@ -230,9 +230,9 @@ def end_of_slope(observation: Observation) -> int | None:
     bent_m = math.sqrt(float(np.mean(polynomial(along, across, 2).left ** 2)))
     if bend_deg < max(SEEN_DEG, OFF_SDS * math.hypot(*known_deg)) or max(off_m) > SHARP * bent_m:
         return None
-    far = np.abs(lines[0].across @ (points - lines[0].middle[:, None])) > OFF_SDS * off_m[0]
-    far[sides[0]] = False
-    return int(frames[int(np.argmax(far)) - 1]) if far.any() else None
+    on = np.abs(lines[0].across @ (points - lines[0].middle[:, None])) < OFF_SDS * off_m[0]
+    on[sides[0]] = True
+    return None if on[-1] else int(frames[np.flatnonzero(on)[-1]])
 
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:

@@ -146,3 +146,15 @@ def test_a_slope_ends_where_its_path_bends_at_one_place(turn_deg: float, length_
 @pytest.mark.parametrize("turn_deg", [0.0, 3.0, 15.0, 40.0])
 def test_a_board_that_is_bent_all_along_has_no_end(turn_deg: float) -> None:
     assert [end_of_slope(bent_path(turn_deg, 1.0, seed)) for seed in range(10)] == [None] * 10
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_slope_of_two_degrees_ends_on_the_level(seed: int) -> None:
+    """A marble that rolls 0.9 m down and 2.4 m on, from the 26th frame on."""
+    times, angle = np.arange(60) / 10, math.radians(2.2)
+    speeds_up = 9.81 * math.sin(angle) / 1.4
+    down = 0.5 * speeds_up * np.minimum(times, 2.6) ** 2
+    on = speeds_up * 2.6 * np.clip(times - 2.6, 0, None)
+    place = np.stack([down * math.cos(angle) + on, -down * math.sin(angle)])
+    last = end_of_slope(seen(place, times, 8e-4, seed))
+    assert last is not None and 24 <= last <= 32
