@@ -73,12 +73,9 @@ def expected(
         return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
 
     if PENDULUM in SCENARIOS[clip.scenario].laws:
-        pendulum = _pendulum(clip, times_s, place_m, velocity)
-        return (
-            declared
-            | pendulum
-            | (_mark_off_thread(clip, pendulum) if observation.is_tracked_here else {})
-        )
+        pendulum = declared | _pendulum(clip, times_s, place_m, velocity)
+        is_filmed = observation.is_tracked_here
+        return pendulum | _mark_off_thread(clip, pendulum) if is_filmed else pendulum
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),

@@ -78,9 +78,9 @@ def _sign(values: np.ndarray) -> int:
 
     What rests, or what a track has leapt to, adds values about 0.
     """
-    values = values[np.abs(values) >= 0.5 * np.median(np.abs(values))] if values.size else values
     if not values.size:
         return 0
+    values = values[np.abs(values) >= 0.5 * np.median(np.abs(values))]
     share = float((values > 0).mean())
     return 1 if share >= MOST_SHARE else -1 if share <= 1 - MOST_SHARE else 0
 

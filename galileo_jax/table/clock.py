@@ -19,6 +19,7 @@ DATE = re.compile(r"\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}(:\d{2}([.,]\d+)?)?\s?(Z|[+-
 DAY = re.compile(r"(?:(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*)?([\d:.,]+)\s*([AaPp]\.?[Mm]\.?)?")
 """Another date than `DATE`, its day, clock, and half of the day: 14.05.2024 09:31:02,033."""
 
+DAY_S = 86400.0
 SAME_RATE = 0.1  # of a rate, by which hundredths from row to row may tell another
 COMMON_FPS = (24, 25, 30, 48, 50, 60, 100, 120, 240)
 
@@ -104,9 +105,9 @@ def _dates(parsed: list[re.Match[str] | None]) -> Numbers:
 
 def _from_first(values: np.ndarray, resolution: float) -> Numbers:
     """Seconds from the first one on, over midnight, too."""
-    seen = np.isfinite(values)
-    values[seen] = np.unwrap(values[seen], period=86400.0)
-    return Numbers(values - (values[seen][0] if seen.any() else 0.0), resolution)
+    seen, found = np.isfinite(values), np.full_like(values, np.nan)
+    found[seen] = np.unwrap(values[seen], period=DAY_S)
+    return Numbers(found - (found[seen][0] if seen.any() else 0.0), resolution)
 
 
 def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> float | None:

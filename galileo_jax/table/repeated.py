@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from galileo_jax.table.clock import COMMON_FPS
-from galileo_jax.video.stamps import REPEATED_SHARE, repeats
+from galileo_jax.video.stamps import REPEATED_SHARE, each_times, repeats
 
 LEAST_ROWS = 4  # of a motion; after fewer a smaller time is a mistake in the file
 MOST_STEPS = 3.0  # from the first row of a motion to its second
@@ -136,10 +136,11 @@ def each_place_once(
     new, total = np.flatnonzero(~is_repeat), len(change)
     if total - len(new) < REPEATED_SHARE * total:
         return np.arange(total), []
-    often = f", each is there {total // len(new)} times" if total % len(new) == 0 else ""
     first = lines[int(is_repeat.argmax())]
-    said = f"{total - len(new)} of {total} rows repeat the places of the one before{often}"
-    return new, [f"line {first}: {said}: left out, and row numbers count the others"]
+    return new, [
+        f"line {first}: {total - len(new)} of {total} rows repeat the places of the one before"
+        f"{each_times(total, len(new))}: left out, and row numbers count the others"
+    ]
 
 
 def without_copies(

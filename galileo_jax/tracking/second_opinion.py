@@ -68,9 +68,8 @@ def with_silhouette(
     then, say, and its silhouette was one with the hand's), both are used all the same: how far
     they are apart is then an unknown shift of whichever goes less far. Where the two go together,
     and now nearer, now farther apart, that is an error of either, as far as its own path is rough:
-    a point on a ball goes round with it. Of a texture that
-    hardly moves while a silhouette sets out from it, the first frame alone counts: it is of the
-    scene behind.
+    a point on a ball goes round with it. Of a texture that hardly moves while a silhouette sets out
+    from it, the first frame alone counts: it is of the scene behind.
     """
     seen = np.isfinite(found.angle_rad)
     if _stays(found, seen):

@@ -16,7 +16,14 @@ import cv2
 import numpy as np
 
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.video.stamps import at_declared_rate, clock_of, is_blank, listed, repeats
+from galileo_jax.video.stamps import (
+    at_declared_rate,
+    clock_of,
+    each_times,
+    is_blank,
+    listed,
+    repeats,
+)
 from galileo_jax.video.weave import NO_ROWS, Rows, first_field, rows_of
 
 MIN_FRAMES = 4  # fewer show no change of speed; also tells a picture from a film
@@ -188,10 +195,9 @@ class _Scan:
         numbers, total = np.flatnonzero(repeats(self.change) & ~blank), len(blank)
         if len(numbers):
             kept = total - len(numbers)
-            often = f", each is there {round(total / kept)} times" if total % kept == 0 else ""
             yield (
-                f"{len(numbers)} of {total} pictures repeat the one before{often} "
-                f"({listed(numbers)}): left out{counted}"
+                f"{len(numbers)} of {total} pictures repeat the one before"
+                f"{each_times(total, kept)} ({listed(numbers)}): left out{counted}"
             )
         if self.missing:
             yield f"{total} of {total + self.missing} announced frames can be decoded"

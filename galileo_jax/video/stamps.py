@@ -106,6 +106,11 @@ def is_blank(contrast: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " pict
     return (index < is_full[0]) | (index > is_full[-1])
 
 
+def each_times(total: int, kept: int) -> str:
+    """That each picture, or row, is there so many times, where that holds; else nothing."""
+    return f", each is there {total // kept} times" if total % kept == 0 else ""
+
+
 def listed(numbers: np.ndarray, most: int = 8) -> str:
     """Numbers of pictures for a line: `3`, `3 to 9`, `1, 2, 4, ...`."""
     if len(numbers) > 2 and len(numbers) == np.ptp(numbers) + 1:

@@ -53,19 +53,10 @@ def start_speed(observation: Observation) -> StartSpeed | None:
 
 
 def rest_s(observation: Observation) -> float | None:
-    """How long object 1 rests where it is first seen, s; None where it is let go at once, or moves.
-
-    It rests if a release that late is likelier than one in the first frame, by `CLEAR` standard
-    deviations, and than a start in motion, by `SURE`.
-    """
+    """How long object 1 rests where it is first seen, s; None where it does not (`_Way.rest`)."""
     early = _first_half(observation)
-    if early is None:
-        return None
-    cost, release_s = early.let_go()
-    is_later = release_s > 1.5 * float(np.median(np.diff(early.times_s)))
-    is_later &= early.release_cost(0.0) - cost > CLEAR**2 * early.scatter(cost)
-    moving = float(np.sum(early.moving().left ** 2))
-    return release_s if is_later and moving - cost > SURE**2 * early.scatter(cost) else None
+    rest = None if early is None else early.rest()
+    return None if rest is None else rest[1]
 
 
 def let_go_frame(observation: Observation) -> int | None:
@@ -75,9 +66,9 @@ def let_go_frame(observation: Observation) -> int | None:
     in a liquid is let go so, too.
     """
     early = _first_half(observation)
-    if early is None or (rests_s := rest_s(observation)) is None:
+    if early is None or (rest := early.rest()) is None:
         return None
-    cost, _ = early.let_go()
+    cost, rests_s = rest
     most = cost + SURE**2 * early.scatter(cost)
     later = range(int(np.searchsorted(early.times_s, rests_s)), len(early.times_s))
     at = next((i for i in later if early.release_cost(float(early.times_s[i])) > most), None)
@@ -126,6 +117,19 @@ class _Way(NamedTuple):
         found = minimize_scalar(self.release_cost, bounds=bounds, method="bounded")
         between = cast(OptimizeResult, found)
         return min((costs[at], float(grid[at])), (float(between.fun), float(between.x)))
+
+    def rest(self) -> tuple[float, float] | None:
+        """The same where it rests before; None where it is let go at once, or moves.
+
+        It rests if a release that late is likelier than one in the first frame, by `CLEAR` standard
+        deviations, and than a start in motion, by `SURE`.
+        """
+        cost, release_s = self.let_go()
+        size = self.scatter(cost)
+        is_later = release_s > 1.5 * float(np.median(np.diff(self.times_s)))
+        is_later &= self.release_cost(0.0) - cost > CLEAR**2 * size
+        moving_cost = float(np.sum(self.moving().left ** 2))
+        return (cost, release_s) if is_later and moving_cost - cost > SURE**2 * size else None
 
 
 def _first_half(observation: Observation) -> _Way | None:
