@@ -115,6 +115,9 @@ def way_text(clip: Clip, way: OtherWay) -> str:
     """The two directions, and which is used, in a line without the clip's name."""
     falls = "falls" if way.path_deg >= 0 else "rises"
     scenario = SCENARIOS[clip.scenario]
+    path = f"{falls} by {abs(way.path_deg):.1f} +- {way.sd_deg:.1g} degrees"
+    if "spring" in scenario.laws:
+        return f"{clip.objects[0].name} swings along a line that {path}, not straight down"
     declared = (
         f"ramp_angle_deg: {way.declared_deg:g} is declared"
         if scenario.has_ramp and scenario.angle_deg is None
@@ -126,7 +129,4 @@ def way_text(clip: Clip, way: OtherWay) -> str:
         if way.is_turned_back
         else ", which is used; check the angle, and whether the camera stood level"
     )
-    return (
-        f"{clip.objects[0].name}'s path {falls} by {abs(way.path_deg):.1f} +- {way.sd_deg:.1g} "
-        f"degrees, but {declared}{what_then}"
-    )
+    return f"{clip.objects[0].name}'s path {path}, but {declared}{what_then}"

@@ -150,3 +150,19 @@ def test_what_is_pushed_up_a_board_tells_where_it_falls(tmp_path, said):
     assert any("goes up to the right" in line for line in measured.remarks) == ("left" not in said)
     found = gx.fit(path).parameters["k1"]
     assert found["q025"] - 0.002 < K1 < found["q975"] + 0.002
+
+
+def test_a_spring_on_a_level_track(tmp_path):
+    """It swings along the track, and no angle is wrong."""
+    times = np.arange(120) / 60
+    place = np.stack([0.1 * np.cos(2 * math.pi * times), np.zeros(120)])
+    place += NOISE_M * np.random.default_rng(0).standard_normal(place.shape)
+    rows = [f"{t},{x},{y},{NOISE_M}" for t, x, y in zip(times, *place, strict=True)]
+    head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
+    (tmp_path / "run.csv").write_text("\n".join([head, *rows]) + "\n")
+    path = tmp_path / "run.yaml"
+    path.write_text("track: run.csv\nscenario: spring\nobjects: [{name: object1, shape: box}]\n")
+    found = gx.fit(path)
+    assert found.parameters["period"]["mean"] == pytest.approx(1.0, abs=0.001)
+    (said,) = (line for line in found.warnings if "not straight down" in line)
+    assert "object1 swings along a line that" in said and "turned" not in said
