@@ -281,3 +281,38 @@ def to_crossing(
     jumped = jump(after(spent_s), at <= soonest)
     found = jax.tree.map(lambda one, other: jnp.where(any_comes, one, other), jumped, whole)
     return found, spent_s
+
+
+class Rubbing(NamedTuple):
+    """What dry friction does to motion along one coordinate; of any state it moves."""
+
+    speed: Callable[[Any], jax.Array]
+    # A state, its time and which way it slips (1, -1, 0: not) to its acceleration, and to by how
+    # much the pull along the way exceeds what friction can hold, over the mass
+    acceleration: Callable[[Any, Any, Any], tuple[jax.Array, jax.Array]]
+    stopped: Callable[[Any], Any]  # a state without its speed
+    moved: Callable[[Any, Any, jax.Array, Any], Any]  # state, its time, a time later, way
+
+
+def to_turn(
+    state: State, time_s: jax.Array, left_s: jax.Array, is_last: Any, rubbing: Rubbing
+) -> tuple[State, jax.Array]:
+    """An `advance` to where it turns back: friction holds it there, if it can."""
+    speed = rubbing.speed(state)
+    pulled, excess = rubbing.acceleration(state, time_s, 0.0)
+    starts = jnp.where(excess > 0, jnp.sign(pulled), 0.0)
+    way = jnp.where(speed == 0, starts, jnp.sign(speed))
+
+    def level(at: State, spent_s: jax.Array) -> tuple[jax.Array, jax.Array]:
+        speeds_up = rubbing.acceleration(at, time_s + spent_s, way)[0]
+        return rubbing.speed(at) * way, speeds_up * way
+
+    def turned(at: State, _: jax.Array) -> State:
+        return rubbing.stopped(at)
+
+    def after(spent_s: jax.Array) -> State:
+        return rubbing.moved(state, time_s, spent_s, way)
+
+    found, spent_s = to_crossing(state, after, level, turned, left_s, way != 0)
+    found = jax.tree.map(lambda one, other: jnp.where(way == 0, one, other), state, found)
+    return found, jnp.where(is_last, left_s, spent_s)

@@ -2,7 +2,8 @@
 
 Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order. On a
 straight path the forces act along it; in the plane gravity is a vector, the effects' forces act
-along the velocity, and the path is how far the body has come along its curve.
+along the velocity, and the path is how far the body has come along its curve. What swings on a spring
+may rub on its track: k m g against its slip, which holds it where it turns back, if it can.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,15 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
-from galileo_jax.rollout.events import PLASTIC_M_S, System, Task, runge_kutta, to_crossing
+from galileo_jax.rollout.events import (
+    PLASTIC_M_S,
+    Rubbing,
+    System,
+    Task,
+    runge_kutta,
+    to_crossing,
+    to_turn,
+)
 from galileo_jax.rollout.motion import Dynamics, state_at, total
 
 MAX_BOUNCES = 8  # within one recorded step
@@ -36,8 +45,17 @@ class FreeSystem(System):
         law, scene = self.law, self.scene
         self.upward = _upward(scene, jnp)
         self.floor = floor_of(task.effects, task.named, scene)
-        self.most_events = 1 if self.floor is None else MAX_BOUNCES
         tangent = _along(law, scene, jnp)
+        self.rubbing = None
+        if rubs(task.effects, task.named, scene):
+            self.rubbing = Rubbing(
+                speed=lambda at: jnp.sum(at.velocity_m_s * tangent),
+                acceleration=self._acceleration,
+                stopped=lambda at: at._replace(velocity_m_s=jnp.zeros_like(at.velocity_m_s)),
+                moved=self._slipped,
+            )
+        is_smooth = self.floor is None and self.rubbing is None
+        self.most_events = 1 if is_smooth else MAX_BOUNCES
         velocity = start_velocity(task.effects, task.named, scene)
         self.start = Body(
             jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
@@ -46,8 +64,10 @@ class FreeSystem(System):
         )
 
     def advance(self, state, time_s, left_s, is_last):
-        """To the next bounce; what bounces faster than the last rests."""
+        """To the next bounce or turn; what bounces faster than the last rests."""
         body, floor = state, self.floor
+        if self.rubbing is not None:
+            return to_turn(body, time_s, left_s, is_last, self.rubbing)
         if floor is None:
             return self._moved(body, time_s, left_s, False), left_s
         rests = (body.position_m[1] <= floor.height_m) & (body.velocity_m_s[1] == 0)
@@ -78,6 +98,21 @@ class FreeSystem(System):
         return runge_kutta(
             lambda at, t: rates(at, t, self.law, self.scene, rests), body, time_s, spent_s
         )
+
+    def _slipped(self, body: Body, time_s: Any, spent_s: jax.Array, way: Any) -> Body:
+        """The body after a time in which it does not turn back."""
+        return runge_kutta(
+            lambda at, t: slip_rates(at, t, self.law, self.scene, way)[0], body, time_s, spent_s
+        )
+
+    def _acceleration(self, at: Body, time_s: Any, way: Any) -> tuple[Any, Any]:
+        changes, excess = slip_rates(at, time_s, self.law, self.scene, way)
+        return jnp.sum(changes.velocity_m_s * _along(self.law, self.scene, jnp)), excess
+
+
+def rubs(effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings) -> bool:
+    """Whether dry friction may act on what goes to and fro along a line."""
+    return not scene.moves_in_plane and any(e.friction(theta, scene) is not None for e in effects)
 
 
 def start_velocity(
@@ -134,6 +169,22 @@ def rates(body: Body, time_s: Any, law: Dynamics, scene: Surroundings, rests: An
         a = a + push(body.velocity_m_s, time_s) / law.inertia[0]
     held = rests & _upward(scene, xp)
     return Body(body.velocity_m_s, xp.where(held, xp.maximum(a, xp.zeros_like(a)), a), speed)
+
+
+def slip_rates(
+    body: Body, time_s: Any, law: Dynamics, scene: Surroundings, way: Any
+) -> tuple[Body, Any]:
+    """How a body on a straight track changes, and by how much its pull exceeds what holds it.
+
+    The latter over its inertia, m/s^2. `way`: 1 or -1, as it slips along the track; 0: not.
+    """
+    xp = body.position_m.__array_namespace__()
+    tangent = _along(law, scene, xp)
+    changes = rates(body, time_s, law, scene, xp.asarray(False))
+    state = state_at(body.way_m[None], xp.sum(body.velocity_m_s * tangent)[None], time_s, scene)
+    rub = (law.coefficient(state) * law.gravity * law.mass / law.inertia)[0]
+    excess = abs(xp.sum(changes.velocity_m_s * tangent)) - rub
+    return changes._replace(velocity_m_s=changes.velocity_m_s - way * rub * tangent), excess
 
 
 def _along(law: Dynamics, scene: Surroundings, xp: Any) -> Any:

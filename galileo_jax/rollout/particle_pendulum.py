@@ -22,7 +22,7 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
-from galileo_jax.rollout.events import System, Task, runge_kutta, to_crossing
+from galileo_jax.rollout.events import Rubbing, System, Task, runge_kutta, to_turn
 from galileo_jax.rollout.motion import Dynamics, state_at, total
 
 SUBSTEPS = 2
@@ -106,28 +106,18 @@ class PendulumSystem(System):
         self.pendulum = make_pendulum(task.effects, task.named, task.scene, self.law)
         self.most_events = MAX_EVENTS if self.pendulum.has_friction else 1
         self.start = self.pendulum.first
+        self.rubbing = Rubbing(
+            speed=lambda at: at.turning_rad_s,
+            acceleration=self._acceleration,
+            stopped=lambda at: at._replace(turning_rad_s=jnp.zeros_like(at.turning_rad_s)),
+            moved=self._moved,
+        )
 
     def advance(self, state, time_s, left_s, is_last):
         """To where it turns back; at any time where nothing rubs."""
         if not self.pendulum.has_friction:
             return self._moved(state, time_s, left_s, 0.0), left_s
-        pulled, excess = self.pendulum.rates(state, time_s, 0.0)
-        starts = jnp.where(excess > 0, jnp.sign(pulled.turning_rad_s), 0.0)
-        way = jnp.where(state.turning_rad_s == 0, starts, jnp.sign(state.turning_rad_s))
-
-        def level(at: Swing, spent_s: jax.Array) -> tuple[jax.Array, jax.Array]:
-            speeds_up = self.pendulum.rates(at, time_s + spent_s, way)[0].turning_rad_s
-            return at.turning_rad_s * way, speeds_up * way
-
-        def turned(at: Swing, _: jax.Array) -> Swing:
-            return at._replace(turning_rad_s=jnp.zeros_like(at.turning_rad_s))
-
-        def after(spent_s: jax.Array) -> Swing:
-            return self._moved(state, time_s, spent_s, way)
-
-        found, spent_s = to_crossing(state, after, level, turned, left_s, way != 0)
-        found = jax.tree.map(lambda one, other: jnp.where(way == 0, one, other), state, found)
-        return found, jnp.where(is_last, left_s, spent_s)
+        return to_turn(state, time_s, left_s, is_last, self.rubbing)
 
     def seen(self, states, times_s):
         """From the angle to x and y."""
@@ -139,6 +129,10 @@ class PendulumSystem(System):
 
         position, velocity = jax.vmap(one)(states, times_s)
         return position.T[None], velocity.T[None]
+
+    def _acceleration(self, at: Swing, time_s: Any, way: Any) -> tuple[Any, Any]:
+        rates, excess = self.pendulum.rates(at, time_s, way)
+        return rates.turning_rad_s, excess
 
     def _moved(self, swing: Swing, time_s: jax.Array, spent_s: jax.Array, way: Any) -> Swing:
         """The bob after a time in which it does not turn back."""

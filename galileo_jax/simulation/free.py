@@ -19,7 +19,14 @@ from galileo_jax.model.effects.laws.liquid import ADDED_MASS
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.rollout.motion import dynamics
-from galileo_jax.rollout.particle_free import Body, floor_of, rates, start_velocity
+from galileo_jax.rollout.particle_free import (
+    Body,
+    floor_of,
+    rates,
+    rubs,
+    slip_rates,
+    start_velocity,
+)
 from galileo_jax.rollout.particle_pendulum import Pendulum, Swing, make_pendulum
 from galileo_jax.simulation.hidden import with_given
 from galileo_jax.simulation.motion import RECORD_S, Motion
@@ -122,9 +129,27 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
         return _swung(make_pendulum(effects, theta, scene, law), times), ()
     floor = floor_of(effects, theta, scene)
     velocity = start_velocity(effects, theta, scene)
+    tangent = np.stack([np.cos(law.ramp_rad), -np.sin(law.ramp_rad)])
     if velocity is None:
-        tangent = np.stack([np.cos(law.ramp_rad), -np.sin(law.ramp_rad)])
         velocity = law.start_speed_m_s[:, None] * tangent
+    start = np.array([*truth.start_m[0], *velocity[0], 0.0])
+
+    def slips(began: float, state: np.ndarray, is_turned: bool) -> Stretch:
+        now = state * [1, 1, not is_turned, not is_turned, 1]
+
+        def changes(t: float, y: np.ndarray, way: float) -> tuple[np.ndarray, float]:
+            body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
+            rows, excess = slip_rates(body, np.asarray(t), law, scene, way)
+            return np.hstack(rows), float(excess)
+
+        pulled, excess = changes(began, now, 0.0)
+        starts = float(np.sign(pulled[2:4] @ tangent)) if excess > 0 else 0.0
+        way = float(np.sign(now[2:4] @ tangent)) or starts
+
+        def turn(t: float, y: np.ndarray) -> float:
+            return float(y[2:4] @ tangent) * way if way and t > began else 1.0
+
+        return Stretch(now, lambda t, y: changes(t, y, way)[0] * abs(way), turn)
 
     def stretch(_: float, state: np.ndarray, is_bounce: bool) -> Stretch:
         now, rests = state.copy(), False
@@ -144,8 +169,9 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
 
         return Stretch(now, change, touch)
 
-    start = np.array([*truth.start_m[0], *velocity[0], 0.0])
-    rows, _, bounces = by_events(stretch, start, times, TOLERANCES)
+    does_rub = rubs(effects, theta, scene)
+    rows, _, events = by_events(slips if does_rub else stretch, start, times, TOLERANCES)
+    bounces = () if does_rub else events
     position, speed = rows[:, :2].T[None], rows[:, 2:4].T[None]
     return Motion(times, position, speed, np.zeros((1, len(times)))), bounces
 

@@ -5,6 +5,7 @@ A track is what a camera of the declared scale and clock would give.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,8 @@ def plane_clips(settings: Settings, hidden: Sequence[Hidden]) -> list[WriteClip]
         truth = draw_free(things, settings.scenario, settings.values, settings.floor)
     for each in hidden:
         truth = hide_in_plane(truth, each, secrets)
+    if settings.seconds is not None:
+        truth = replace(truth, seconds=max(truth.seconds, settings.seconds))
     return [partial(_write, settings, truth, looks)]
 
 

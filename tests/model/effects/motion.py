@@ -42,7 +42,15 @@ LIBRARY = (
 )
 # Listed there, too, and without a place on a ramp: of falls, flights and pendulums.
 OFF_THE_RAMP = (
-    *("added_mass", "camera_roll", "magnus", "bearing_friction", "rod_mass", "thread_stretch"),
+    *(
+        "added_mass",
+        "camera_roll",
+        "magnus",
+        "bearing_friction",
+        "dry_friction",
+        "rod_mass",
+        "thread_stretch",
+    ),
     *("oval_rim", "uneven_pressure"),
 )
 ALONE = replace(HIT, object2_x_m=None)
