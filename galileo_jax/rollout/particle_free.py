@@ -2,8 +2,8 @@
 
 Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order. On a
 straight path the forces act along it; in the plane gravity is a vector, the effects' forces act
-along the velocity, and the path is how far the body has come along its curve. What swings on a spring
-may rub on its track: k m g against its slip, which holds it where it turns back, if it can.
+along the velocity, and the path is how far the body has come along its curve. What swings on a
+spring may rub on its track: k m g against its slip, which holds it where it turns back, if it can.
 """
 
 from collections.abc import Mapping, Sequence
