@@ -134,22 +134,10 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
         velocity = law.start_speed_m_s[:, None] * tangent
     start = np.array([*truth.start_m[0], *velocity[0], 0.0])
 
-    def slips(began: float, state: np.ndarray, is_turned: bool) -> Stretch:
-        now = state * [1, 1, not is_turned, not is_turned, 1]
-
-        def changes(t: float, y: np.ndarray, way: float) -> tuple[np.ndarray, float]:
-            body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
-            rows, excess = slip_rates(body, np.asarray(t), law, scene, way)
-            return np.hstack(rows), float(excess)
-
-        pulled, excess = changes(began, now, 0.0)
-        starts = float(np.sign(pulled[2:4] @ tangent)) if excess > 0 else 0.0
-        way = float(np.sign(now[2:4] @ tangent)) or starts
-
-        def turn(t: float, y: np.ndarray) -> float:
-            return float(y[2:4] @ tangent) * way if way and t > began else 1.0
-
-        return Stretch(now, lambda t, y: changes(t, y, way)[0] * abs(way), turn)
+    def slips(t: float, y: np.ndarray, way: float) -> tuple[np.ndarray, float]:
+        body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
+        changes, excess = slip_rates(body, np.asarray(t), law, scene, way)
+        return np.hstack(changes), float(excess)
 
     def stretch(_: float, state: np.ndarray, is_bounce: bool) -> Stretch:
         now, rests = state.copy(), False
@@ -170,7 +158,8 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
         return Stretch(now, change, touch)
 
     does_rub = rubs(effects, theta, scene)
-    rows, _, events = by_events(slips if does_rub else stretch, start, times, TOLERANCES)
+    goes_on = _to_turns(slips, np.array([0, 0, *tangent, 0])) if does_rub else stretch
+    rows, _, events = by_events(goes_on, start, times, TOLERANCES)
     bounces = () if does_rub else events
     position, speed = rows[:, :2].T[None], rows[:, 2:4].T[None]
     return Motion(times, position, speed, np.zeros((1, len(times)))), bounces
@@ -179,22 +168,14 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
 def _swung(pendulum: Pendulum, times: np.ndarray) -> Motion:
     """The motion of a pendulum, from one turning back to the next."""
 
-    def stretch(began: float, state: np.ndarray, is_turned: bool) -> Stretch:
-        now = np.array([state[0], 0.0 if is_turned else state[1]])
-        pulled, excess = pendulum.rates(Swing(*now), np.asarray(began), 0.0)
-        way = np.sign(now[1]) or (np.sign(pulled.turning_rad_s) if excess > 0 else 0.0)
-        slip = way if pendulum.has_friction else 0.0
+    def slips(t: float, y: np.ndarray, way: float) -> tuple[np.ndarray, float]:
+        changes, excess = pendulum.rates(Swing(*y), np.asarray(t), way)
+        return np.hstack(changes), float(excess)
 
-        def change(t: float, y: np.ndarray) -> np.ndarray:
-            if way == 0.0:
-                return np.zeros(2)
-            return np.hstack(pendulum.rates(Swing(*y), np.asarray(t), slip)[0])
+    def swings_on(_: float, state: np.ndarray, __: bool) -> Stretch:
+        return Stretch(state, lambda t, y: slips(t, y, 0.0)[0], lambda t, y: 1.0)
 
-        def turn(t: float, y: np.ndarray) -> float:
-            return float(y[1] * way) if slip and t > began else 1.0
-
-        return Stretch(now, change, turn)
-
+    stretch = _to_turns(slips, np.array([0, 1])) if pendulum.has_friction else swings_on
     swings, changes, _ = by_events(
         stretch, np.array(pendulum.first, float), times, SWING_TOLERANCES
     )
@@ -217,6 +198,29 @@ class Stretch(NamedTuple):
     change: Change
     # Time and state to what falls through zero at the event
     event: Callable[[float, np.ndarray], float]
+
+
+def _to_turns(
+    slips: Callable[[float, np.ndarray, float], tuple[np.ndarray, float]], along: np.ndarray
+) -> Callable[[float, np.ndarray, bool], Stretch]:
+    """How what rubs dry goes on to where it turns back, and is held there or not.
+
+    `slips`: time, state and which way it slips (1, -1, 0: not) to the state's rate, and to by how
+    much the pull exceeds what friction holds. `along`: its product with a state is the speed.
+    """
+
+    def stretch(began: float, state: np.ndarray, is_turned: bool) -> Stretch:
+        now = state * (along == 0) if is_turned else state
+        pulled, excess = slips(began, now, 0.0)
+        starts = float(np.sign(pulled @ along)) if excess > 0 else 0.0
+        way = float(np.sign(now @ along)) or starts
+
+        def turn(t: float, y: np.ndarray) -> float:
+            return float(y @ along) * way if way and t > began else 1.0
+
+        return Stretch(now, lambda t, y: abs(way) * slips(t, y, way)[0], turn)
+
+    return stretch
 
 
 def by_events(
