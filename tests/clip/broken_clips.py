@@ -290,7 +290,7 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "fps_is_zero": _edit("fps: 30.0", "fps: 0", "fps", "0", "above 0"),
     "fps_is_negative": _edit("fps: 30.0", "fps: -30.0", "fps", "-30"),
     "fps_is_a_duration": _edit("fps: 30.0", "fps: 0.03333", "fps", "did you mean 30"),
-    "angle_is_zero": _edit("20.0", "0.0", "ramp_angle_deg", "(0, 90)"),
+    "angle_is_zero": _edit("20.0", "0.0", "ramp_angle_deg", "(0, 90)", "scenario: level"),
     "angle_is_ninety": _edit("20.0", "90", "ramp_angle_deg", "90", "(0, 90)"),
     "angle_is_negative": _edit("20.0", "-20.0", "ramp_angle_deg", "-20", "(0, 90)"),
     "angle_in_radians": _edit("20.0", "0.349", "ramp_angle_deg", "did you mean 20", "radians"),
