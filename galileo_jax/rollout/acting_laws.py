@@ -3,7 +3,8 @@
 Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Rollouts in
 which no force and no friction law acts have a program without any, in which the motion between
 events is known in closed form. All others share one, which is told which laws act in its batch. In
-the same way rims that are not round, which take seven times as long, have programs apart.
+the same way rims that are not round, which take seven times as long, have programs apart, and so
+has dry friction of what swings, which is held where it turns back: without it nothing happens.
 
 A part of library effects holds all of them that have a place in the scene: those that the model
 does not have do nothing, and a fit and a diagnosis, of whatever effects, call the same programs.
@@ -22,7 +23,8 @@ from galileo_jax.model.effects.effect import HOOKS, Effect
 from galileo_jax.model.effects.registry import library_effects
 from galileo_jax.model.model import Model
 
-STEADY, WITH_LAWS, WITH_OVALS = 0, 1, 2  # kinds of rollouts: bits of one number
+STEADY, WITH_LAWS, WITH_OVALS, WITH_TURNS = 0, 1, 2, 4  # kinds of rollouts: bits of one number
+EVERY_KIND = WITH_LAWS | WITH_OVALS | WITH_TURNS
 LAW_HOOKS, OVAL_HOOKS = {"force", "push", "friction"}, {"oval"}
 SEEN_HOOKS = {"time", "measure"}  # that change what is seen of a motion
 TOLD_HOOKS = {"parameters", "odds", "derived"}  # that change neither
@@ -101,7 +103,7 @@ class ActingLaws:
 
     def _kinds(self, acts: Bool[np.ndarray, "law batch"]) -> np.ndarray:
         """Which program each rollout has, `[batch]`."""
-        kinds = np.full(acts.shape[1], STEADY if self._is_ours else WITH_LAWS | WITH_OVALS)
+        kinds = np.full(acts.shape[1], STEADY if self._is_ours else EVERY_KIND)
         for law, is_there in zip(self._laws, acts, strict=True):
             kinds |= np.where(is_there, law.kind, STEADY)
         return kinds
@@ -114,7 +116,7 @@ class ActingLaws:
                 effect
                 for effect in _every(self._model)
                 if (_has(effect, moving) or not _has(effect, SEEN_HOOKS))
-                and (effect in self._model.nuisances or _kind(effect) & ~kind == 0)
+                and (effect in self._model.nuisances or _kind(effect, self._model) & ~kind == 0)
             ],
         )
 
@@ -154,16 +156,28 @@ def _has(effect: Effect, hooks: set[str]) -> bool:
     return any(getattr(type(effect), hook) is not getattr(Effect, hook) for hook in hooks)
 
 
-def _kind(effect: Effect) -> int:
+def _kind(effect: Effect, model: Model) -> int:
     """What rollouts have in which it acts."""
-    return WITH_LAWS * _has(effect, LAW_HOOKS) | WITH_OVALS * _has(effect, OVAL_HOOKS)
+    kind = WITH_LAWS * _has(effect, LAW_HOOKS) | WITH_OVALS * _has(effect, OVAL_HOOKS)
+    return kind | WITH_TURNS * _rubs(effect, model)
+
+
+def _rubs(effect: Effect, model: Model) -> bool:
+    """Whether it is dry friction of what slides on nothing."""
+    scene = model.scene.surroundings
+    if scene.has_surface or not _has(effect, {"friction"}):
+        return False
+    parameters = (*model.parameters, *effect.parameters(scene))
+    theta = {parameter.name: np.asarray(parameter.absent) for parameter in parameters}
+    return effect.friction(theta, scene) is not None
 
 
 def _law(effect: Effect, model: Model) -> Law | None:
     """None of an effect without a place, or without anything that all rollouts do not have."""
     parameters = effect.parameters(model.scene.surroundings)
-    if not _kind(effect) or not parameters:
+    kind = _kind(effect, model)
+    if not kind or not parameters:
         return None
     own = [p for p in parameters if p.name in model.names]
     columns = np.array([model.index(p.name) for p in own], int)
-    return Law(effect, _kind(effect), columns, np.array([p.absent for p in own]))
+    return Law(effect, kind, columns, np.array([p.absent for p in own]))

@@ -12,6 +12,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.parameters import absent
+from galileo_jax.rollout.acting_laws import ActingLaws
 
 K, G, REST = 0.02, 9.81, 0.1
 SWING = {"period": 1.0, "damping": 1e-9, "rest": REST, "start_speed": 0.0}
@@ -61,6 +62,18 @@ def test_the_engine_is_scipys_motion(start_speed, tmp_path):
     seen = problem.simulate(theta)
     assert seen == pytest.approx(observation.position_m, abs=1e-5)
     assert np.ptp(observation.position_m[0, 1, -20:]) < 1e-5  # at rest
+
+
+def test_what_does_not_rub_has_a_program_without_turns(tmp_path):
+    clip(tmp_path)
+    observation = read_observation_csv(tmp_path / "clip.csv")
+    loaded = load_clip(tmp_path / "clip.csv")
+    model = make_problem(loaded, observation, "auto", make_effects(["dry_friction"])).model
+    theta = np.tile(absent(model.parameters), (2, 1))
+    theta[1, model.index("dry_friction")] = K
+    shares = ActingLaws(model).shares(theta)
+    assert [rows.tolist() for _, rows in shares] == [[0], [1]]
+    assert ["dry_friction" in share.names for share, _ in shares] == [False, True]
 
 
 def test_a_fit_tells_it_from_damping(tmp_path):
