@@ -211,8 +211,8 @@ FrameRate = Annotated[Number, refused({
 })]  # fmt: skip
 RampAngle = Annotated[Number, refused({
     "< 0": "{v:g} is outside (0, 90) degrees; which way a ramp falls is direction: left or right",
-    "<= 0": "{v:g} is outside (0, 90) degrees; on a level table alone: scenario: level",
-    ">= 90": "{v:g} is outside (0, 90) degrees; straight down: scenario: fall",
+    "<= 0": "{v:g} is outside (0, 90) degrees; what slides on a level table: scenario: level",
+    ">= 90": "{v:g} is outside (0, 90) degrees; what goes straight down: scenario: fall",
     f"< {MIN_RAMP_ANGLE_DEG}": "{v:g} is too flat to slide; degrees expected; did you mean "
                                "{degrees:.4g} ({v:g} radians)?",
 })]  # fmt: skip

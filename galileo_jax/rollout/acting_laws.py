@@ -4,7 +4,8 @@ Most hypotheses have one effect of twenty; the others are pinned where they do n
 which no force and no friction law acts have a program without any, in which the motion between
 events is known in closed form. All others share one, which is told which laws act in its batch. In
 the same way rims that are not round, which take seven times as long, have programs apart, and so
-has dry friction of what swings, which is held where it turns back: without it nothing happens.
+has dry friction of what swings, which is held where it turns back: without it nothing
+interrupts the swing.
 
 A part of library effects holds all of them that have a place in the scene: those that the model
 does not have do nothing, and a fit and a diagnosis, of whatever effects, call the same programs.

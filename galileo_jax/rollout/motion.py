@@ -65,6 +65,7 @@ class Dynamics(NamedTuple):
     brake: Callable[[State], PerObject]  # `State` to friction's size `[..., object]`, N
     gravity: Array  # `[...]` or a number, m/s^2
     is_steady: bool  # whether drive and brake are constant on either side of the foot
+    rubs: bool  # whether a law of friction may act
     # Forces with directions of their own on one free body, see `Effect.push`
     pushes: tuple[Push, ...] = ()
 
@@ -121,6 +122,7 @@ def dynamics(
         brake=brake,
         gravity=scene.gravity,
         is_steady=not laws and not adds,
+        rubs=bool(laws),
         pushes=tuple(push for e in effects if (push := e.push(theta, scene)) is not None),
     )
 

@@ -47,7 +47,7 @@ class FreeSystem(System):
         self.floor = floor_of(task.effects, task.named, scene)
         tangent = _along(law, scene, jnp)
         self.rubbing = None
-        if rubs(task.effects, task.named, scene):
+        if rubs(law, scene):
             self.rubbing = Rubbing(
                 speed=lambda at: jnp.sum(at.velocity_m_s * tangent),
                 acceleration=self._acceleration,
@@ -110,9 +110,9 @@ class FreeSystem(System):
         return jnp.sum(changes.velocity_m_s * _along(self.law, self.scene, jnp)), excess
 
 
-def rubs(effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings) -> bool:
+def rubs(law: Dynamics, scene: Surroundings) -> bool:
     """Whether dry friction may act on what goes to and fro along a line."""
-    return not scene.moves_in_plane and any(e.friction(theta, scene) is not None for e in effects)
+    return law.rubs and not scene.moves_in_plane
 
 
 def start_velocity(

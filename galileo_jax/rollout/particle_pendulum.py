@@ -42,7 +42,6 @@ class Pendulum(NamedTuple):
     law: Dynamics  # the forces along its circle
     length_m: Any  # without load
     stretch_m: Any  # by its weight at rest
-    has_friction: bool  # whether the bearing rubs
     first: Swing  # the bob at the start
     scene: Surroundings  # where it is
 
@@ -93,9 +92,8 @@ def make_pendulum(
     """Puts parameters (numbers) and effects together."""
     length = theta[LENGTH]
     stretch = total([0.0 * length, *(e.stretch(theta, scene) for e in effects)])
-    rubs = any(e.friction(theta, scene) is not None for e in effects)
     first = Swing(theta[ANGLE], law.start_speed_m_s[0] / length)
-    return Pendulum(law, length, stretch, rubs, first, scene)
+    return Pendulum(law, length, stretch, first, scene)
 
 
 class PendulumSystem(System):
@@ -104,7 +102,7 @@ class PendulumSystem(System):
     def __init__(self, task: Task):
         super().__init__(task)
         self.pendulum = make_pendulum(task.effects, task.named, task.scene, self.law)
-        self.most_events = MAX_EVENTS if self.pendulum.has_friction else 1
+        self.most_events = MAX_EVENTS if self.law.rubs else 1
         self.start = self.pendulum.first
         self.rubbing = Rubbing(
             speed=lambda at: at.turning_rad_s,
@@ -115,7 +113,7 @@ class PendulumSystem(System):
 
     def advance(self, state, time_s, left_s, is_last):
         """To where it turns back; at any time where nothing rubs."""
-        if not self.pendulum.has_friction:
+        if not self.law.rubs:
             return self._moved(state, time_s, left_s, 0.0), left_s
         return to_turn(state, time_s, left_s, is_last, self.rubbing)
 
@@ -123,7 +121,7 @@ class PendulumSystem(System):
         """From the angle to x and y."""
 
         def one(swing: Swing, time_s: jax.Array) -> tuple[jax.Array, jax.Array]:
-            way = jnp.sign(swing.turning_rad_s) if self.pendulum.has_friction else 0.0
+            way = jnp.sign(swing.turning_rad_s) if self.law.rubs else 0.0
             turns = self.pendulum.rates(swing, time_s, way)[0].turning_rad_s
             return self.pendulum.place(swing, turns)
 

@@ -157,7 +157,7 @@ def solve_free(truth: PlaneTruth) -> tuple[Motion, tuple[float, ...]]:
 
         return Stretch(now, change, touch)
 
-    does_rub = rubs(effects, theta, scene)
+    does_rub = rubs(law, scene)
     goes_on = _to_turns(slips, np.array([0, 0, *tangent, 0])) if does_rub else stretch
     rows, _, events = by_events(goes_on, start, times, TOLERANCES)
     bounces = () if does_rub else events
@@ -175,7 +175,7 @@ def _swung(pendulum: Pendulum, times: np.ndarray) -> Motion:
     def swings_on(_: float, state: np.ndarray, __: bool) -> Stretch:
         return Stretch(state, lambda t, y: slips(t, y, 0.0)[0], lambda t, y: 1.0)
 
-    stretch = _to_turns(slips, np.array([0, 1])) if pendulum.has_friction else swings_on
+    stretch = _to_turns(slips, np.array([0, 1])) if pendulum.law.rubs else swings_on
     swings, changes, _ = by_events(
         stretch, np.array(pendulum.first, float), times, SWING_TOLERANCES
     )
