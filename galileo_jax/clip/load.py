@@ -246,6 +246,7 @@ def _observed(path: Path, file: ClipFile, read: FileTrack) -> dict[str, Any]:
         "track": track,
         "track_units": read.unit,
         "is_own_track": read.is_own,
+        "direction": read.direction,
         **(in_pixels if read.unit == "px" else {}),
         "frame_count": len(read.observation.times_s),
         "warnings": warnings,

@@ -67,6 +67,7 @@ class FileTrack:
     # of a file in pixels; None = unknown (lengths are in nominal metres)
     pixels_per_metre: float | None = None
     origin_px: tuple[float, float] | None = None  # of a file in pixels; None = unknown
+    direction: str = "right"  # of the travel
     warnings: tuple[str, ...] = ()  # doubts, one line each
 
 
@@ -151,6 +152,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     times = with_lost_frames(as_read, table.position)
     lost = lost_text(of.path, as_read, times)
     said: tuple[str, ...] = ()
+    direction = of.file.direction
     if table.axes == ("angle",):
         observation = swung(of, times, table.position[:, 0])
     elif len(table.axes) == 1:
@@ -160,10 +162,10 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     else:
         table, turned = in_plane(of, table)
         y_axis, told = _y_axis_of(of, table, times, unit)
-        said = turned + told
-        position = _placed(
-            of, table, metres, origin if is_px else of.file.track_origin or (0.0, 0.0), y_axis
-        )
+        direction, moves_to = _direction_of(of, table)
+        said = turned + told + moves_to
+        foot = origin if is_px else of.file.track_origin or (0.0, 0.0)
+        position = _placed(table, metres, foot, y_axis, direction)
         last_place = _last_place_m(table, metres)
         with named(of.path):
             observation = _observation(of.names, times, position, last_place, is_px and not scale)
@@ -173,6 +175,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
         fps=1 / table.frame_s_by(of.fps) if table.is_in_frames else _frame_rate(times),
         pixels_per_metre=scale,
         origin_px=origin,
+        direction=direction,
         warnings=table.warnings + warnings + lost + said + _doubts(of, table),
     )
 
@@ -241,12 +244,25 @@ def _y_axis_of(
     return found, (f"{of.path}: track_y: {found}, as the motion shows; declare it if it is not",)
 
 
+def _direction_of(of: DeclaredTrack, table: TrackTable) -> tuple[str, tuple[str, ...]]:
+    """Which way object 1 goes along x: as declared, on a ramp as the motion shows."""
+    declared = of.file.direction
+    if "direction" in of.file.model_fields_set or not of.scenario.has_ramp:
+        return declared, ()
+    x = table.position[0, 0][np.isfinite(table.position[0]).all(axis=0)]
+    gone = x - x[:1]
+    found = "left" if gone.size and gone[np.argmax(np.abs(gone))] < 0 else "right"
+    if found == declared:
+        return declared, ()
+    return found, (f"{of.path}: direction: {found}, as the motion shows; declare it if it is not",)
+
+
 def _placed(
-    of: DeclaredTrack,
     table: TrackTable,
     metres: float,
     origin: tuple[float, float] | None,
     y_axis: str,
+    direction: str,
 ) -> np.ndarray:
     """`[object, 2, row]`, m, x along the travel, y up; from object 1 without an origin."""
     position, calibration = table.position, table.calibration
@@ -260,7 +276,7 @@ def _placed(
             y = y * calibration.pixels_per_unit[0] / calibration.pixels_per_unit[1]
         cos, sin = math.cos(calibration.roll_rad), math.sin(calibration.roll_rad)
         x, y = cos * x + sin * y, cos * y - sin * x
-    found = np.stack([x if of.file.direction == "right" else -x, y], axis=1) * metres
+    found = np.stack([x if direction == "right" else -x, y], axis=1) * metres
     return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, np.nan)
 
 

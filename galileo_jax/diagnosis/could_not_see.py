@@ -37,6 +37,7 @@ from typing import Any, Self
 import numpy as np
 from scipy.special import logsumexp
 
+from galileo_jax.diagnosis.changed_numbers import changed_numbers
 from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -54,6 +55,7 @@ from galileo_jax.search.score_tests import (
 
 ROUNDS = 3  # of slopes: each at the strength that the one before gave
 RATE_Z = 1e-3  # of a strength's prior: a difference over it is a derivative
+USUAL_Z = 1.0  # as large as effects usually are, in a strength's prior
 PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their prior
 
 
@@ -62,9 +64,11 @@ class Unseen:
     """What a model that describes the clips leaves open of the effects that it does not have.
 
     Attributes:
-      could_not_see: effect to `strength` and `unit`, as diagnosis.json has them, the most probable
-        beforehand first: the smallest strength that the clips would have shown; None where not even
-        the largest that anybody expects would.
+      could_not_see: effect to `strength`, `usual`, `unit` and `changes`, as diagnosis.json has
+        them, the most probable beforehand first: the smallest strength that the clips would have
+        shown, None where not even the largest that anybody expects would; how strong it usually is;
+        and the numbers of the fit that this strength (of None, the usual one) would change by more
+        than their standard deviations.
       in_question: effects that may be missing although the model describes the clips: from the
         slopes to them they are worth what a verdict asks for, and a free size of imperfections
         takes them up.
@@ -105,7 +109,13 @@ def unseen(
         odds = {one.effect: one.log_odds() - behind for one in alone}
         least = max(needed, max(odds.values(), default=0.0) - DECISIVE)
         in_question |= {name for name, own in odds.items() if own >= least}
-    entries = {name: one.entry() for name, one in beside.items()}
+    each = [one.entry() for one in beside.values()]
+    probes = np.array([probe for _, probe in each]).reshape(len(each), -1)
+    changes = changed_numbers(own, last.fit, probes) if each else []
+    entries = {
+        name: entry | {"changes": changed}
+        for name, (entry, _), changed in zip(beside, each, changes, strict=True)
+    }
     return Unseen(entries, tuple(sorted(in_question)))
 
 
@@ -186,16 +196,24 @@ class _Beside:
         mean = float(logsumexp(np.where(is_one, odds, -np.inf)) - np.log(len(odds)))
         return mean + self.log_prior
 
-    def entry(self) -> dict[str, Any]:
-        """Its smallest strength; of one with a place or a length the median of its shapes."""
-        shown, unit = float(np.median(self._smallest())), self._strength.unit
+    def entry(self) -> tuple[dict[str, Any], np.ndarray]:
+        """Its smallest strength, the usual one and their unit; and the parameters with it.
+
+        Of one with a place or a length, the median of its shapes.
+        """
+        smallest, own = self._smallest(), self._strength
+        median = np.argsort(smallest)[(len(smallest) - 1) // 2]
+        shown, unit, per = float(smallest[median]), own.unit, 1.0
+        usual = abs(float(in_units(own.prior, USUAL_Z)) - own.absent)
+        probe = self.probes[median].copy()
+        probe[self._where] = own.absent + (shown if np.isfinite(shown) else usual)
         constants: Mapping[str, str] = force_constants(self.trials)
         is_per_mass = self.effect in constants and "m1" in self.trials.names
         if is_per_mass and not is_any_weighed(self.trials):
             theta = self.trials.theta(self.fit.z, self.fit.free)
-            shown /= float(theta[self.trials.names.index("m1")])
-            unit = constants[self.effect]
-        return {"strength": float(f"{shown:.3g}") if np.isfinite(shown) else None, "unit": unit}
+            per, unit = float(theta[self.trials.names.index("m1")]), constants[self.effect]
+        strength = float(f"{shown / per:.3g}") if np.isfinite(shown) else None
+        return {"strength": strength, "usual": float(f"{usual / per:.3g}"), "unit": unit}, probe
 
     def _smallest(self) -> np.ndarray:
         """Of each shape, by slopes that are taken nearer and nearer to it."""

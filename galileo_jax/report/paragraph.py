@@ -157,7 +157,7 @@ def _gravity(check: Mapping[str, Any]) -> str:
 
 
 def unseen_text(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None = None) -> str:
-    """The smallest strengths that would have shown, of the likeliest of all other effects.
+    """The smallest strengths that would have shown, of what would change most in the result.
 
     Of compare.json, or of diagnosis.json where there is one.
     """
@@ -166,16 +166,60 @@ def unseen_text(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None = 
     if diagnosis is not None:
         in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
         asked = [row["effect"] for row in diagnosis["candidates"]]
-    told = [name for name in asked if name not in in_question and name in found]
-    parts = [_smaller(name, found[name]) for name in told[:MOST_UNSEEN]]
+    told = {name: found[name] for name in asked if name not in in_question and name in found}
+    parts = [
+        _smaller(name, told[name], number, is_first=i == 0)
+        for i, (name, number) in enumerate(_worst(told))
+    ]
     return sentence(f"{listed(parts)} could not have been seen") if parts else ""
 
 
-def _smaller(name: str, told: Mapping[str, Any]) -> str:
+def _worst(told: Mapping[str, Any]) -> list[tuple[str, str | None]]:
+    """Effects, and the number that each would change most: of every number the worst first.
+
+    In its standard deviations, by an effect as strong as it usually is, if that could not have been
+    seen. None: no number by more than its standard deviation.
+    """
+    sizes: dict[tuple[str, str | None], float] = {(name, None): 0.0 for name in told}
+    for name, one in told.items():
+        strength = one["strength"] or one.get("usual") or 1.0
+        share = min((one.get("usual") or strength) / strength, 1.0)
+        for number, changed in one.get("changes", {}).items():
+            sizes[name, number] = share * abs(changed["sds"])
+    chosen: dict[str, str | None] = {}
+    seen: set[str | None] = {None}
+    in_turn = sorted(sizes, key=lambda pair: -sizes[pair])
+    for is_new in (True, False):
+        for name, number in in_turn:
+            if name not in chosen and (not is_new or number not in seen):
+                chosen[name] = number
+                seen.add(number)
+    return list(chosen.items())[:MOST_UNSEEN]
+
+
+def _smaller(name: str, told: Mapping[str, Any], number: str | None, is_first: bool) -> str:
     """An effect that is weaker than its `strength`, in words; of any, where that is None."""
     strength = told["strength"]
     if strength is None:
-        return f"{_words(name)} of any usual strength"
-    if name in SHARES:
-        return f"{SHARES[name]} that is off by less than {float(f'{100 * strength:.2g}'):g} %"
-    return f"{_words(name)} below {float(f'{strength:.2g}'):g}{_unit(told['unit'])}"
+        text = f"{_words(name)} of any usual strength"
+    elif name in SHARES:
+        text = f"{SHARES[name]} that is off by less than {_strength(name, told, strength)}"
+    else:
+        text = f"{_words(name)} below {_strength(name, told, strength)}"
+    if number is None:
+        return text
+    what = number if FRICTION.fullmatch(number) else _words(number)
+    changed = f"{what} by {_figures(abs(told['changes'][number]['by']))}"
+    if strength is None:
+        return f"{text} ({_strength(name, told, told['usual'])} would change {changed})"
+    return f"{text} ({'which would change ' if is_first else ''}{changed})"
+
+
+def _strength(name: str, told: Mapping[str, Any], value: float) -> str:
+    """A strength of an effect with its unit, or in per cent."""
+    return f"{_figures(100 * value)} %" if name in SHARES else _figures(value) + _unit(told["unit"])
+
+
+def _figures(value: float) -> str:
+    """Two of them."""
+    return f"{float(f'{value:.2g}'):g}"

@@ -1,5 +1,6 @@
 """What a clip could not have shown: strengths by slopes."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -70,6 +71,32 @@ def test_each_effect_of_the_library_has_a_strength_and_a_unit(tmp_path):
     assert seen["air_drag"]["unit"] == "1/m", "nobody weighed it"
     assert 0.001 < seen["air_drag"]["strength"] < 1.0
     assert seen["rolling"]["strength"] is None, "friction takes its place on one slope"
+
+
+def test_of_a_slope_the_change_of_friction_is_its_formula(tmp_path):
+    """The acceleration was seen: k = tan a - seen / (g cos a), so dk = (1 + k tan a) da."""
+    trials = made(tmp_path, 0.0003)
+    base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
+    found = unseen(trials, base, {"ramp_angle": -3.0}, 0).could_not_see["ramp_angle"]
+    k1 = float(trials.theta(base.fit.z, base.fit.free)[trials.names.index("k1")])
+    slope = np.tan(np.radians(20.0))
+    change = found["changes"]["k1"]
+    assert abs(change["by"]) == pytest.approx((1 + k1 * slope) * found["strength"], rel=0.03)
+    assert abs(change["sds"]) > 3.0
+
+
+def test_what_is_hidden_changes_a_number_by_what_is_said(tmp_path):
+    """A drag of just this strength is what the fit without it has its friction off by."""
+    told = seen_in(made(tmp_path, 0.0003))["air_drag"]
+    m1 = json.loads((tmp_path / "a.truth.json").read_text())["m1"]
+    drag = {"air_drag": {"air_drag": told["strength"] * m1}}
+    path = tmp_path / "hidden.csv"
+    truth = simulate(path, scenario="incline", seed=3, track_only=True, effects=drag).truths[0]
+    seen = measure(load(path))
+    trials = with_library([seen.clip], [seen.observation], "rigid", EFFECTS)
+    fit = best_fit(GradientFitter(trials), 0, effects=())
+    k1 = float(trials.theta(fit.z, fit.free)[trials.names.index("k1")])
+    assert truth["k1"] - k1 == pytest.approx(told["changes"]["k1"]["by"], rel=0.2)
 
 
 def test_larger_errors_hide_more(tmp_path):

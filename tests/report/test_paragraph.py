@@ -119,6 +119,44 @@ def test_where_nothing_is_missing_it_is_said_what_could_not_have_been_seen():
     )
 
 
+def test_what_would_change_a_number_most_is_said_first_and_of_every_number_one():
+    def change(by, sds):
+        return {"by": by, "sds": sds}
+
+    unseen = {
+        "air_drag": {"strength": 0.02, "usual": 1.0, "unit": "1/m", "changes": {}},
+        "restitution": {
+            "strength": 0.326,
+            "usual": 0.84,
+            "unit": "1",
+            "changes": {"k2": change(0.11, 8.4)},
+        },
+        "table_tilt": {
+            "strength": 0.02,
+            "usual": 0.03,
+            "unit": "rad",
+            "changes": {"k2": change(-0.04, -3.0), "k1": change(0.001, 1.1)},
+        },
+        "frame_rate": {
+            "strength": None,
+            "usual": 0.07,
+            "unit": "1",
+            "changes": {"k1": change(-0.02, -30.0)},
+        },
+        "static_friction": {  # no usual one is so strong
+            "strength": 30.0,
+            "usual": 0.3,
+            "unit": "1",
+            "changes": {"k1": change(0.9, 1000.0)},
+        },
+    }
+    said = paragraph(result(k1=entry(0.29, 0.004)), {**CHECK, "could_not_see": unseen}, None)
+    assert said.endswith(
+        "Frame rate of any usual strength (7 % would change k1 by 0.02), restitution below 0.33 "
+        "(k2 by 0.11) and static friction below 30 (k1 by 0.9) could not have been seen."
+    )
+
+
 def test_what_is_a_share_of_something_declared_is_said_in_per_cent():
     unseen = {name: {"strength": 0.0141, "unit": "1"} for name in ("frame_rate", "scale_error")}
     said = paragraph(result(k1=entry(0.29, 0.004)), {**CHECK, "could_not_see": unseen}, None)
