@@ -224,14 +224,15 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
     seen = on_ramp(observation) if scenario.has_table else observation
     found = start_speed(seen)
     if found is None:
-        is_ramp = is_declared and clip.scenario == "ramp"
-        if is_ramp and (rests_s := rest_s(seen)) is not None:
+        rests_s = rest_s(seen)
+        if is_declared and clip.scenario == "ramp" and rests_s is not None:
             told.say(
                 f"{first.name} rests for {rests_s:.2g} s from frame {first.first_frame} on, where "
                 "it is declared to be let go; write `first_frame: null` for it, which takes the "
                 "release from the motion, or try the effect release_delay"
             )
-        return clip
+        # What rests shows when it is let go; else that may be before the first row of a table.
+        return moving if first.first_frame is None and rests_s is None else clip
     how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
     what_then = (
         "declare `starts_moving: true` if it was let go before, or try the effect initial_push"

@@ -66,13 +66,16 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     change = usual[:, after] - usual[:, before]
     usual_pull = np.median(change / between_s, axis=1, keepdims=True)
     size = np.linalg.norm(change - usual_pull * between_s, axis=0)
-    own_m_s2 = size / between_s
+    noise_m_s = np.hypot(error[after], error[before]) * np.sqrt(np.pi / 2)
+    # Of their squares noise alone makes so much, across a gap as from one frame to the next.
+    own = np.maximum(size**2 - len(change) * noise_m_s**2, 0.0)
+    own_m_s2 = np.sqrt(own) / between_s
     beside = np.pad(own_m_s2, apart, constant_values=np.inf)
     beside = np.minimum(beside[: -2 * apart], beside[2 * apart :])
     usual_m_s2 = np.maximum(np.quantile(own_m_s2, 0.75), np.where(beside < np.inf, beside, 0.0))
     steady = usual_m_s2 * between_s
     speed = np.linalg.norm(usual, axis=0)
-    clear = CLEAR * np.hypot(error[after], error[before]) * np.sqrt(np.pi / 2)
+    clear = CLEAR * noise_m_s
     beyond = size - steady
     is_blow = (beyond > HIT_M_S2 * np.median(step_s)) & (size > USUAL * steady) & (beyond > clear)
     is_blow &= size > SHARE * np.maximum(speed[before], speed[after])
