@@ -62,8 +62,8 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
         top = int(np.argmax(abs(y - y[0])))
         start, highest, end = place[:, seen][:, [0, top, -1]].T
         gone, back = highest - start, end - highest
-        # What comes back the way it went was pushed up first.
-        value = gone[1] if (back * gone < -BACK * gone**2).all() else start[1] - end[1]
+        comes_back = (back * gone < -BACK * gone**2).all()
+        value = _against_pull(t[: top + 1], y[: top + 1]) if comes_back else start[1] - end[1]
     elif shows == "sink":
         value = y[0] - y[-1]
     elif shows == "sag":
@@ -71,6 +71,19 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
     else:
         value = -_sign(accelerations(t, y))
     return None if value == 0 else "up" if value > 0 else "down"
+
+
+def _against_pull(times: np.ndarray, place: np.ndarray) -> float:
+    """Which way is up for what went this way and came back, in the sign.
+
+    What was pushed up slows down on its way; what slid down speeds up, and a hand carries it back.
+    """
+    gone = np.abs(place - place[0]) / abs(place[-1] - place[0])
+    # Without the push, and the rest at the end.
+    way = slice(int(np.argmax(gone > BACK)), int(np.argmax(gone > 1 - BACK)))
+    if way.stop - way.start < MIN_POINTS:
+        return float(place[-1] - place[0])
+    return -float(np.polyfit(times[way] - times[way.start], place[way], 2)[0])
 
 
 def _sign(values: np.ndarray) -> int:

@@ -62,12 +62,13 @@ def goes_up(observation: Observation) -> bool:
     return bool(away[0, int(np.argmax(np.hypot(*away[:2])))] < 0)
 
 
-def pushed_frame(observation: Observation, index: int = 0) -> int | None:
-    """The first frame after a push on the level, or up a board; None where nothing pushes it first.
+def pushed_frame(observation: Observation, index: int = 0, least_m_s2: float = 0.0) -> int | None:
+    """The first frame after a push on the level, or on a board; None where nothing pushes it first.
 
     It gains speed, by `CLEAR` standard deviations of its acceleration in a window and by `HELD` of
     what friction slows it down by, within the first half of its way only: what gains speed for
-    longer is pulled by something of the scene.
+    longer is pulled by something of the scene. Somewhere it does so by more than `least_m_s2`,
+    which is what the scene itself may speed it up by.
     """
     path = observation.path(index)
     if len(path) < 4 * FEWEST:
@@ -86,6 +87,8 @@ def pushed_frame(observation: Observation, index: int = 0) -> int | None:
     around = np.pad(is_gain, 1)
     gains = np.flatnonzero(is_gain & (around[:-2] | around[2:]))
     if not gains.size or middle[gains[-1]] > PUSHED_WAY:
+        return None
+    if not (found[gains] > least_m_s2 + CLEAR * sd).any():
         return None
     return int(path.frames[min(gains[-1] + size, len(path) - 1)])
 

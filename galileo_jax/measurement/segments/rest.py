@@ -31,7 +31,9 @@ def placed_frames(observation: Observation) -> tuple[int | None, int | None]:
     if not rests:
         return None, None
     runs = runs_between(rests, len(path))
-    ways = np.array([place_m[:, last] - place_m[:, first] for first, last in runs])
+    lowest = [first + int(np.argmin(place_m[1, first : last + 1])) for first, last in runs]
+    firsts = [first for first, _ in runs]
+    ways = (place_m[:, lowest] - place_m[:, firsts]).T
     run = int(np.argmin(ways[:, 1]))
     if ways[run, 1] >= 0:
         return None, None

@@ -21,6 +21,7 @@ what is no more the object that was marked is `Astray`.
                              come to rest
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -60,8 +61,7 @@ PLACED = "is put into its place by a hand before that"
 TAKEN = "is taken away by a hand from then on"
 IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
-PUSHED = "is pushed by a hand before that: it gains speed on a level table"
-PUSHED_UP = "is pushed by a hand before that: it gains speed up the board"
+PUSHED = "is pushed by a hand before that: it gains speed, and loses it from then on"
 SWINGS = ("pendulum", "spring", "liquid")
 EXPOSED_FRAMES = 1
 """Of a video: the hit falls into an exposure, whose frame shows neither before nor after."""
@@ -158,17 +158,28 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         # Before other ends are looked for: a clock that changes looks like a blow.
         last = change[0] - (EXPOSED_FRAMES if kept.observation.is_tracked_here else 0)
         kept = kept.cut("after", last, CHANGES_RATE.format(change[1]))
-    if scenario.has_ramp and scenario.angle_deg == 0:
+    pushed, down_m_s2 = None, _down_m_s2(clip, kept.observation)
+    if scenario.angle_deg == 0 or (is_let_go and down_m_s2 is not None):
         # A short push is a blow, too, and no end.
-        kept = kept.cut("before", handling.pushed_frame(kept.observation), PUSHED)
-        return kept.cut("after", *_end_of_one(clip, kept.observation))
+        pushed = handling.pushed_frame(kept.observation, least_m_s2=down_m_s2 or 0.0)
+        kept = kept.cut("before", pushed, PUSHED)
     kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
         return kept.cut("before", handling.thrown_frame(kept.observation, rest_belongs), HELD)
-    if is_let_go and handling.goes_up(kept.observation):
-        return kept.cut("before", handling.pushed_frame(kept.observation), PUSHED_UP)
-    return kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_let_go else kept
+    is_hand_asked = is_let_go and scenario.angle_deg != 0 and pushed is None
+    return (
+        kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_hand_asked else kept
+    )
+
+
+def _down_m_s2(clip: Clip, observation: Observation) -> float | None:
+    """The most that a board alone can speed object 1 up; None where that is not known."""
+    if handling.goes_up(observation):
+        return 0.0
+    if clip.ramp_angle_deg is None or not clip.is_scale_known:
+        return None
+    return clip.gravity * math.sin(math.radians(clip.ramp_angle_deg))
 
 
 def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
