@@ -1,6 +1,7 @@
 """What is in a hand at first: when a throw, a drop or a swing becomes free, and what stops it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from galileo_jax.measurement.segments.handling import (
     thrown_frame,
 )
 from galileo_jax.measurement.segments.rest import standstill_frame
+from galileo_jax.measurement.segments.segments import HELD, PUSHED
 from galileo_jax.measurement.segments.start_speed import let_go_frame
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
@@ -207,3 +209,77 @@ def test_what_a_wall_throws_back_past_its_start_was_not_pushed(hit_s: float) -> 
     there, back = np.minimum(times, hit_s), np.clip(times - hit_s, 0, None)
     way = -1.0 * there + slows * there**2 / 2 + 0.8 * back - slows * back**2 / 2
     assert pushed_frame(noisy(times, np.stack([way, 0 * way]), noise_m=2e-4)) is None
+
+
+def table_of(
+    folder: Path, scenario: str, times: np.ndarray, place: np.ndarray, more="", noise_m=7e-4
+) -> Path:
+    """A table as others write them, and its yaml, which is returned."""
+    noise = np.random.default_rng(5).normal(0, noise_m, place.shape)
+    table = np.column_stack([times, *(place + noise)])
+    np.savetxt(folder / "t.csv", table, "%.4f", ",", header="t (s),x (m),y (m)", comments="")
+    path = folder / "t.yaml"
+    path.write_text(
+        f"track: t.csv\nscenario: {scenario}\n{more}objects:\n- {{name: thing, shape: sphere}}\n"
+    )
+    return path
+
+
+@pytest.mark.parametrize(
+    ("rests_s", "hand_s", "gently"),
+    [(0.0, 0.25, False), (0.0, 0.4, True), (0.6, 0.2, False), (0.3, 0.3, True)],
+)
+def test_of_a_throw_the_flight_is_kept_and_the_hand_left_out(
+    tmp_path, rests_s, hand_s, gently
+) -> None:
+    """The hand lets go at once, or its push dies away; before, it may hold the thing still."""
+    times, fine, velocity = np.arange(110) / 60, np.arange(0, 1.9, 1e-4), np.array([2.0, 3.0])
+    share = np.clip((fine - rests_s) / hand_s, 0, 1)
+    speed = (1 - np.cos(np.pi * share)) / 2 if gently else share
+    flies = np.clip(fine - rests_s - hand_s, 0, None)
+    moves = velocity[:, None] * speed - np.array([[0.0], [9.81]]) * flies
+    place = np.stack([np.interp(times, fine, np.cumsum(one) * 1e-4) for one in moves])
+    (cut,) = measure(load_clip(table_of(tmp_path, "flight", times, place, noise_m=2e-3))).cuts
+    assert cut.side == "before" and cut.why == HELD
+    # A push that dies away does not show to its end.
+    assert (-0.05 if gently else -0.02) < cut.time_s - rests_s - hand_s < 0.1
+
+
+def test_a_push_on_a_board_too_rough_to_slide_is_left_out(tmp_path) -> None:
+    times, off_s, push, slows = np.arange(90) / 60, 0.2, 6.0, 1.6
+    pushed, free = np.clip(times, 0, off_s), np.clip(times - off_s, 0, push * off_s / slows)
+    gone = push * pushed**2 / 2 + push * off_s * free - slows * free**2 / 2
+    angle = np.radians(12.0)
+    place = np.stack([gone * np.cos(angle), 0.5 - gone * np.sin(angle)])
+    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 12\n")
+    (cut,) = measure(load_clip(path)).cuts
+    assert (cut.side, cut.why) == ("before", PUSHED) and off_s < cut.time_s < off_s + 0.15
+
+
+def test_what_a_brake_slows_on_its_way_was_not_pushed(tmp_path) -> None:
+    """It gains speed for a third of the way, as the board lets it."""
+    times, on_s, gains, slows = np.arange(90) / 60, 0.7, 1.5, 1.2
+    fast, slow = np.clip(times, 0, on_s), np.clip(times - on_s, 0, gains * on_s / slows)
+    gone = gains * fast**2 / 2 + gains * on_s * slow - slows * slow**2 / 2
+    angle = np.radians(20.0)
+    place = np.stack([gone * np.cos(angle), 0.5 - gone * np.sin(angle)])
+    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 20\n")
+    assert not [cut for cut in measure(load_clip(path)).cuts if cut.side == "before"]
+
+
+@pytest.mark.parametrize("wobble_m", [0.0, 4e-3])
+def test_who_carries_it_back_up_is_left_out_and_up_stays_up(tmp_path, wobble_m) -> None:
+    """A hand that trembles lets go at .8 s, and catches it at 1.65 s."""
+    times, off_s, caught_s, speeds_up = np.arange(200) / 60, 0.8, 1.65, 1.58
+    free = np.clip(times - off_s, 0, caught_s - off_s)
+    stopped = 0.04 * (1 - np.exp(-np.clip(times - caught_s, 0, None) / 0.04))
+    gone = speeds_up * free**2 / 2 + speeds_up * (caught_s - off_s) * stopped
+    gone = gone + wobble_m * np.sin(10.7 * times) * (times < off_s)
+    gone = np.maximum(gone - 0.5 * np.clip(times - 2.0, 0, None), 0)
+    angle = np.radians(23.0)
+    place = np.stack([gone * np.cos(angle), 0.8 - gone * np.sin(angle)])
+    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 23\n")
+    measured = measure(load_clip(path))
+    assert not any("track_y" in line or "direction" in line for line in measured.warnings)
+    used = measured.segments.within(times)
+    assert used[(times > 0.9) & (times < 1.6)].all() and not used[times > 1.7].any()

@@ -17,8 +17,8 @@ exactly the parabola of what follows tells, back to the first frame that it does
 
 import numpy as np
 
-from galileo_jax.measurement.segments.blow import continues
-from galileo_jax.numerics.least_squares import least_squares
+from galileo_jax.measurement.segments.blow import SMEARED, continues
+from galileo_jax.numerics.least_squares import least_squares, polynomial
 from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
@@ -26,6 +26,7 @@ WAY, EARLY = (0.15, 0.7), 0.2  # shares of the length of the way
 WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
 PUSHED_WAY = 0.5  # of the way on a level table
 LATER = 0.4  # of the windows of what falls or flies: the others tell what is usual
+FREE_FRAMES = 20  # on either side of a jump, that tell the acceleration
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
 
 
@@ -104,18 +105,41 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
     if rest_belongs:
         gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
         path = path[_leaves(path, gone, float(gone.max())) :]
-    size, held = _window(len(path)), -1
+    size, held, is_carried = _window(len(path)), -1, False
     while 3 * size <= len(path):
-        held, is_clear = _last_held(path, size)
+        held, is_carried, is_clear = _last_held(path, size)
         if held >= 0 or is_clear:
             break
         size *= 2  # so short a window does not tell the acceleration
     first = held + size if held >= 0 else 0
-    last = min(first + max(2 * FEWEST, 2 * size), len(path))
-    while first > 0 and continues(path, first - 1, slice(first, last)):
+    free = slice(first, min(first + 4 * max(FEWEST, size), len(path)))
+    # A drag that changes on the way leads on to what was before it, and a hand that lets go gently.
+    while first > 0 and continues(path, first - 1, free if is_carried else slice(first, free.stop)):
         first -= 1
     # Within a step of its end a hand's push does not show.
     return int(path.frames[first + 1]) if first else None
+
+
+def comes_free(observation: Observation, last: int) -> bool:
+    """Whether what jumps after the frame `last` is let go there, and falls or flies from then on.
+
+    A bounce has the same acceleration on both sides: its weight's. A hand lifts or holds.
+    """
+    path = observation.path()
+    at = int(np.searchsorted(path.frames, last)) + 1
+    parts = path[max(at - FREE_FRAMES, 0) : at], path[at + SMEARED : at + SMEARED + FREE_FRAMES]
+    if min(map(len, parts)) < FEWEST:
+        return False
+    fits = [polynomial(part.times_s - part.times_s[0], part.place_m.T, 2) for part in parts]
+    held, free = (2 * fit.solution[0] for fit in fits)
+    sds = [
+        2
+        * float(np.sqrt(np.mean(np.sum(fit.left**2, axis=0)) / (len(part) - 3) * fit.inverse[0, 0]))
+        for fit, part in zip(fits, parts, strict=True)
+    ]
+    size, apart = float(np.linalg.norm(free)), float(np.linalg.norm(held - free))
+    falls = -free[1] > abs(free[0]) and size > CLEAR * sds[1]
+    return bool(falls and apart > max(HELD * size, CLEAR * float(np.hypot(*sds))))
 
 
 def _window(frames: int) -> int:
@@ -130,8 +154,11 @@ def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:
     return len(left) - int(np.argmin(np.append(left[::-1], False)))
 
 
-def _last_held(path: PointPath, size: int) -> tuple[int, bool]:
-    """Where the last window with a hand on begins, -1: none; and whether noise lets it show."""
+def _last_held(path: PointPath, size: int) -> tuple[int, bool, bool]:
+    """Where the last window with a hand on begins, -1: none; and whether noise lets it show.
+
+    Between these, whether the hand carried it: it fell less than `HELD` as fast as later.
+    """
     starts = np.arange(len(path) - size + 1)
     each = [_accelerations(path, one, starts, size) for one in path.place_m]
     found, sd = np.array([one for one, _ in each]), each[0][1]
@@ -141,7 +168,11 @@ def _last_held(path: PointPath, size: int) -> tuple[int, bool]:
     scatter = max(1.4826 * float(np.median(apart[is_later])), sd)
     clear = max(HELD * weight, CLEAR * scatter, CLEAR * float(np.quantile(apart[is_later], 0.75)))
     held = np.flatnonzero((apart > clear) & ~is_later)
-    return (int(starts[held[-1]]) if held.size else -1), clear == HELD * weight
+    usual = np.median(found[:, is_later], axis=1)
+    falls = usual @ found[:, held] / max(float(usual @ usual), np.finfo(float).tiny)
+    is_carried = held.size and usual[1] < 0 and np.median(falls) < HELD
+    last = int(starts[held[-1]]) if held.size else -1
+    return last, bool(is_carried), clear == HELD * weight
 
 
 def _beside_free(

@@ -22,7 +22,7 @@ what is no more the object that was marked is `Astray`.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -163,6 +163,8 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         # A short push is a blow, too, and no end.
         pushed = handling.pushed_frame(kept.observation, least_m_s2=down_m_s2 or 0.0)
         kept = kept.cut("before", pushed, PUSHED)
+    if is_free and not clip.objects[0].first_frame:
+        kept = kept.cut("before", _first_free(clip, kept.observation), HELD)
     kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
@@ -171,6 +173,21 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     return (
         kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_hand_asked else kept
     )
+
+
+def _first_free(clip: Clip, observation: Observation) -> int | None:
+    """The first frame after a hand's last jump, in what falls or flies; None without one."""
+    last = _blow_finder(clip, observation)(observation)
+    if last is None or not handling.comes_free(observation, last):
+        return None
+    seen = np.flatnonzero(observation.mask[0])
+    return int(seen[int(np.searchsorted(seen, last)) + 1 + blow.SMEARED])
+
+
+def _blow_finder(clip: Clip, observation: Observation) -> Callable[[Observation], int | None]:
+    """What finds the last frame before a blow."""
+    is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
+    return blow.bounce_frame if is_in_space else blow.blow_frame
 
 
 def _down_m_s2(clip: Clip, observation: Observation) -> float | None:
@@ -199,9 +216,7 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
     if SCENARIOS[clip.scenario].has_ramp:
         ends.append((end_of_slope(observation), SLOPE_ENDS))
     if is_board or is_free or is_swing:
-        is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
-        find = blow.bounce_frame if is_in_space else blow.blow_frame
-        ends.append((find(observation), STRUCK))
+        ends.append((_blow_finder(clip, observation)(observation), STRUCK))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:
         return None, ""
