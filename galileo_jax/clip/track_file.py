@@ -142,11 +142,13 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     metres = 1 / (scale or NOMINAL_SCALE_PX_PER_M) if is_px else METRES_PER_UNIT[unit]
     seen = np.isfinite(table.position).all(axis=1).any(axis=0)
     moves = np.fmax.reduce(table.position, axis=-1) > np.fmin.reduce(table.position, axis=-1)
-    if seen.any() and not moves.any():
+    if not seen.any():
+        raise of.wrong("no row has a place: all cells are empty, or nan")
+    if not moves.any():
         raise of.wrong(
             "nothing moves: all rows have the same place; was the right column exported?"
         )
-    first = int(seen.argmax())  # 0, where none was seen
+    first = int(seen.argmax())
     as_read = times[first:] - times[first]
     table = replace(table, position=table.position[..., first:])
     times = with_lost_frames(as_read, table.position)

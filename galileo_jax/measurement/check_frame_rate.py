@@ -19,13 +19,14 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
 from galileo_jax.numerics.least_squares import least_squares, polynomial
 from galileo_jax.numerics.periodogram import period_s
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
-LEAST_FACTOR_FREE = 1.4  # too few frames of what touches nothing: nothing else falls so fast
+LEAST_FACTOR_FREE = 1.4  # of what touches nothing and feels no drag: only scale and clock do that
 SURE_SDS = 4.0  # by which gravity must be off
 UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
 CLEARLY_NEARER = 0.5  # of the way to another explanation
@@ -46,6 +47,7 @@ class ApparentGravity(NamedTuple):
     value: float  # the estimate
     is_least: bool = False  # whether it can only be more: friction is not known
     sd: float = 0.0  # its standard deviation; 0 where it is not known
+    is_parabola: bool = False  # whether the path is one: no drag makes gravity seem less
 
 
 def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
@@ -55,7 +57,7 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         return None
     factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
     is_free = SCENARIOS[clip.scenario].up_shows == "bend"
-    least = LEAST_FACTOR_FREE if is_free and factor < 1 else LEAST_FACTOR
+    least = LEAST_FACTOR_FREE if is_free and (factor < 1 or found.is_parabola) else LEAST_FACTOR
     if max(factor, 1 / factor) < least or (found.is_least and factor > 1):
         return None
     if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
@@ -81,6 +83,40 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         scale = clip.pixels_per_metre * found.value / clip.gravity
         doubt += f" (or pixels_per_metre is off: {scale:.3g} in place of {clip.pixels_per_metre:g})"
     return doubt
+
+
+def speed_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where one object speeds up by more than its slope can; None elsewhere.
+
+    By a parabola in time along its way: a > g sin A, which friction only lowers, by `SURE_SDS`
+    standard deviations of a and of the slope's angle. On the level g sin A is 0.
+    """
+    scenario, seen = SCENARIOS[clip.scenario], observation.mask[0]
+    is_asked = scenario.has_ramp and not scenario.has_table and clip.is_scale_known
+    if not is_asked or clip.ramp_angle_deg is None or seen.sum() <= MIN_POINTS:
+        return None
+    place = observation.position_m[0, :2][:, seen]
+    gone = place - place[:, :1]
+    furthest = gone[:, int(np.argmax(np.hypot(*gone)))]
+    times = observation.times_s[seen]
+    fit = polynomial(times - times[0], furthest @ gone / np.hypot(*furthest), 2)
+    variance = float(np.sum(fit.left**2)) / (len(times) - 3) * float(fit.inverse[0, 0])
+    found, sd, angle = 2 * float(fit.solution[0]), 2 * math.sqrt(variance), clip.ramp_angle_deg
+    found *= -1.0 if furthest[1] > 0 and angle else 1.0  # up the board
+    most, rate = (clip.gravity * f(math.radians(angle)) for f in (math.sin, math.cos))
+    known = math.hypot(sd, rate * math.radians(math.hypot(LEVEL_SD_DEG, clip.ramp_angle_sd_deg)))
+    if found - most < SURE_SDS * known:
+        return None
+    speeds_up = f"{clip.path}: {observation.names[0]} speeds up by {found:.3g} +- {sd:.1g} m/s^2"
+    if not angle:
+        return (
+            f"{speeds_up} on the level, where friction only slows it down: something pulls or "
+            "pushes it, or the table slopes (scenario: incline)"
+        )
+    return (
+        f"{speeds_up}; a slope of {angle:g} degrees gives {most:.3g} without any friction: check "
+        "ramp_angle_deg, the times and the scale, or something pulls it"
+    )
 
 
 def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | None:
@@ -129,7 +165,8 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
     if gain > size / 2 * (CHANCE ** (-2 / size) - 1):
         return found
     variance = left / (len(times) - 3) * float(parabola.inverse[0, 0])
-    return ApparentGravity(-2 * float(parabola.solution[0]), sd=2 * math.sqrt(variance))
+    gravity, sd = -2 * float(parabola.solution[0]), 2 * math.sqrt(variance)
+    return ApparentGravity(gravity, sd=sd, is_parabola=True)
 
 
 def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:

@@ -21,7 +21,7 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.average_rows import with_rows_averaged
-from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
+from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import (
@@ -165,9 +165,11 @@ def measure(clip: Clip) -> Measurement:
         told.remarks += lost_text(clip.path, times_s, pixels.times_s)
     segments = segment(clip, whole, pixels)
     # A track that goes astray tells nothing of the clock.
-    doubt = None if segments.astray else frame_rate_doubt(clip, whole)
-    told.say(*map(str, segments.cuts))
     observation = segments.used(whole)
+    doubt = None if segments.astray else frame_rate_doubt(clip, whole)
+    if doubt is None and not segments.astray:
+        doubt = speed_doubt(clip, observation)
+    told.say(*map(str, segments.cuts))
     clip = _moving(clip, observation, segments, told)
     if scenario.is_level or clip.scenario == "toss":
         # The places of a ball in space are as uncertain along its way as its times, which a wander

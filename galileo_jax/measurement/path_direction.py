@@ -60,9 +60,10 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     path = falls_deg(line)
     is_spring = "spring" in scenario.laws
     may_turn = is_spring or not observation.is_tracked_here
-    # What goes to and fro has no end; a board may be gone up as well as down.
-    apart = abs(_turn_between(path, declared, 180.0 if is_spring or scenario.has_ramp else 360.0))
-    if scenario.has_ramp and not may_turn:
+    # What goes to and fro has no end; boards and liquids may be gone up as well as down.
+    is_both_ways = is_spring or scenario.has_ramp or scenario.up_shows == "sink"
+    apart = abs(_turn_between(path, declared, 180.0 if is_both_ways else 360.0))
+    if is_spring or (scenario.has_ramp and not may_turn):
         path = _turn_between(path, 0.0, 180.0)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
     if may_turn and apart > NEARER * max(off_axis, sd):

@@ -67,8 +67,10 @@ def _written(value: Any) -> str:
     match value:
         case float() | int() if not isinstance(value, bool):
             return repr(int(value) if float(value).is_integer() and abs(value) < 1e15 else value)
-        case datetime() | date() | time():
+        case datetime() | time():
             return value.isoformat()
+        case date():  # calamine's word for midnight
+            return datetime.combine(value, time()).isoformat()
         case timedelta():
             return repr(value.total_seconds())
     return str(value).strip()
