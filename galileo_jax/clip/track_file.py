@@ -143,7 +143,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     seen = np.isfinite(table.position).all(axis=1).any(axis=0)
     moves = np.fmax.reduce(table.position, axis=-1) > np.fmin.reduce(table.position, axis=-1)
     if not seen.any():
-        raise of.wrong("no row has a place: all cells are empty, or nan")
+        raise of.wrong("seen in 0 rows: all places are empty, or nan")
     if not moves.any():
         raise of.wrong(
             "nothing moves: all rows have the same place; was the right column exported?"

@@ -27,6 +27,8 @@ from galileo_jax.video import decode
 UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
 
+FOLLOWS = 0.2  # of its way at least must be followed while it is seen
+
 Point = tuple[float, float]
 
 
@@ -69,6 +71,7 @@ def track_clip(clip: Clip) -> Track:
         coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
     times_s = np.array(clip.frame_times_s)
     found = track_video(shown, starts, times_s, coding=coding, advance=advance)
+    _check_followed(clip, square, found, movers)
     return found if view is None else view.track(found, clip)
 
 
@@ -155,6 +158,30 @@ def _with_points(clip: Clip, movers: Sequence[Mover], open_frames: OpenFrames) -
         found[item.name] = marked
     objects = tuple(found.get(item.name, item) for item in clip.objects)
     return clip.model_copy(update={"objects": objects})
+
+
+def _check_followed(clip: Clip, marked: Clip, track: Track, movers: Sequence[Mover]) -> None:
+    """Raises `InputError` where what was found to move is not what was followed.
+
+    `marked`: the clip with the places that were found.
+    """
+    for i, (item, found) in enumerate(zip(clip.objects, marked.objects, strict=True)):
+        if item.point_px is not None:
+            continue
+        mover = min(movers, key=lambda one: math.dist(one.point_px, found.point_px or (0.0, 0.0)))
+        both = track.is_visible[i] & np.isfinite(mover.way_px[:, 0])
+        if not both.any():
+            continue
+        moves, goes = (
+            float(np.hypot(*np.ptp(way[both], axis=0)))
+            for way in (mover.way_px, track.position_px[i])
+        )
+        if moves > WINDOW_PX and goes < FOLLOWS * moves:
+            raise InputError(
+                f"{clip.path}: objects ({item.name}): point_px: missing, and what was found there "
+                f"moves by {moves:.0f} px, but what could be followed by {goes:.1f} px only; mark "
+                f"it: galileo label {clip.video} --help"
+            )
 
 
 def _sizes_px(clip: Clip) -> list[Point | None]:

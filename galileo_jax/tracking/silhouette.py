@@ -24,6 +24,7 @@ NOISE_SDS, LEAST_GREY = 6.0, 10.0  # what differs by less than so many sds, or g
 SMOOTH_PX = 1.0
 LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
 """Parts smaller, or larger than this share of the picture, are none."""
+FILLS = 0.3  # of the box around it: what fills less has thin pieces
 MOST_FOREGROUND = 0.3  # if more of a picture differs the camera moves
 SAME_AREA = 1.5  # from a frame to the next an object's silhouette grows or shrinks by less
 OFF_SIZE, OFF_STEP = 0.6, 0.35
@@ -170,12 +171,37 @@ def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
     mask = _differs(picture, scene)
     if mask.mean() > MOST_FOREGROUND:
         return []
-    _, _, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    _, labels, stats, centres = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     height, width = mask.shape
     found = []
-    for (left, top, wide, high, area), centre in zip(stats[1:], centres[1:], strict=True):
+    for label, (centre, one) in enumerate(zip(centres[1:], stats[1:], strict=True), 1):
+        left, top, wide, high, area = one.tolist()
         low, end = np.array([left, top]), np.array([left + wide, top + high])
         is_cut = (low == 0).any() or (end == (width, height)).any()
-        if not is_cut and LEAST_AREA_PX2 <= area <= MOST_SHARE * mask.size:
-            found.append(Part(centre, float(area), low, end - 1))
+        if is_cut or not LEAST_AREA_PX2 <= area <= MOST_SHARE * mask.size:
+            continue
+        part = Part(centre, float(area), low, end - 1)
+        if area < FILLS * wide * high:
+            part = _thick(labels[top : top + high, left : left + wide] == label, low)
+        found.append(part)
     return sorted(found, key=lambda part: -part.area_px2)[:MOST_PARTS]
+
+
+def _thick(mask: np.ndarray, low_px: np.ndarray) -> Part:
+    """The largest piece of a part that is half as thick as its thickest place or more.
+
+    A ball without the thread that it hangs on, or a box without the edge of its shadow.
+    """
+    padded = np.pad(mask.astype(np.uint8), 1)
+    radius = float(cv2.distanceTransform(padded, cv2.DIST_L2, 5).max())
+    size = 2 * max(round(radius / 2), 1) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    opened = cv2.morphologyEx(padded, cv2.MORPH_OPEN, kernel)
+    _, _, stats, centres = cv2.connectedComponentsWithStats(opened)
+    if len(stats) < 2:
+        opened = padded
+        _, _, stats, centres = cv2.connectedComponentsWithStats(opened)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    left, top, wide, high, area = stats[largest].tolist()
+    low = low_px + np.array([left, top]) - 1
+    return Part(centres[largest] + low_px - 1, float(area), low, low + np.array([wide, high]) - 1)

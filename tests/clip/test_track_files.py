@@ -179,6 +179,23 @@ def test_direction_and_origin_of_lengths(tmp_path: Path) -> None:
     check_motion(observation_of(clip))
 
 
+@pytest.mark.parametrize("key", ["", "; direction: left"])
+def test_a_table_tells_which_way_its_ramp_goes(key: str, tmp_path: Path) -> None:
+    rows = "".join(f"{t:.6f},{-x:.6f},{y:.6f}\n"
+                   for t, x, y in zip(make.times(), *make.path_m(), strict=True))  # fmt: skip
+    told = f"track_units: m; track_y: up{key}"
+    clip = clip_of(tmp_path, "slide.csv", "t,x,y\n" + rows, told)
+    check_motion(observation_of(clip))
+    assert clip.direction == "left"
+    assert any("direction: left, as the motion shows" in one for one in clip.warnings) == (not key)
+
+
+def test_a_table_without_any_place_is_refused_in_a_line(tmp_path: Path) -> None:
+    rows = "".join(f"{t:.6f},nan,nan\n" for t in make.times())
+    with pytest.raises(InputError, match=r"slide\.csv: seen in 0 rows"):
+        clip_of(tmp_path, "slide.csv", "t,x,y\n" + rows, "track_units: m; track_y: up")
+
+
 OWN_CSV = "time_s,object1_x_m,object1_y_m\n" + "".join(
     f"{t:.6f},{x:.6f},{y:.6f}\n" for t, x, y in zip(make.times(), *make.path_m(), strict=True)
 )

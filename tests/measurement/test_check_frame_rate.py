@@ -162,3 +162,34 @@ def test_a_level_table_in_centimetres(per_metre, is_said, tmp_path):
     doubt = frame_rate_doubt(clip, seen)
     assert (doubt is not None) == is_said
     assert doubt is None or "likely track_units: cm | mm | in (or fps: 24 or less)" in doubt
+
+
+@pytest.mark.parametrize("factor", [0.65, 1.5])
+def test_half_of_gravity_and_twice_are_no_gravity(factor, tmp_path):
+    clip, seen = off(*fall(tmp_path), factor)
+    seen = seen.between(slice(6, None))  # without the rest, which is no parabola
+    assert "gravity would be" in (frame_rate_doubt(clip, seen) or "")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "speeds_up", "says"),
+    [
+        ("incline", 3.2, None),
+        ("incline", 4.6, "a slope of 22 degrees gives 3.67 without any friction"),
+        ("level", -1.0, None),
+        ("level", 0.8, "on the level, where friction only slows it down"),
+    ],
+)
+def test_what_speeds_up_more_than_its_slope_lets_it_is_said(scenario, speeds_up, says, tmp_path):
+    times, angle = np.arange(40) / FPS, math.radians(22.0 if scenario == "incline" else 0.0)
+    gone = 0.9 * times + speeds_up * times**2 / 2
+    place = np.stack([gone * math.cos(angle), 0.5 - gone * math.sin(angle)])
+    place += NOISE_M * np.random.default_rng(0).standard_normal(place.shape)
+    path, table = tmp_path / "a.yaml", np.column_stack([times, *place])
+    np.savetxt(tmp_path / "a.csv", table, "%.5f", ",", header="t (s),x (m),y (m)", comments="")
+    slope = "ramp_angle_deg: 22\n" if scenario == "incline" else ""
+    path.write_text(
+        f"track: a.csv\nscenario: {scenario}\n{slope}objects:\n- {{name: block, shape: box}}\n"
+    )
+    found = " ".join(measure(load_clip(path)).doubts)
+    assert says in found if says else not found

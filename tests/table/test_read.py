@@ -3,6 +3,7 @@
 import io
 import zipfile
 from collections.abc import Callable
+from datetime import date, datetime
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import read_table
+from galileo_jax.table.spreadsheet import _written
 from galileo_jax.table.track_table import TrackTable
 
 ROWS = 21
@@ -413,6 +415,12 @@ def spreadsheet(rows: list[list[str]]) -> bytes:
 
 def test_a_spreadsheet(tmp_path: Path) -> None:
     check(read(tmp_path, spreadsheet([one.split(",") for one in lines()]), "xlsx"))
+
+
+def test_midnight_keeps_its_clock() -> None:
+    """Calamine gives a date alone for it."""
+    assert _written(date(2025, 5, 7)) == "2025-05-07T00:00:00"
+    assert _written(datetime(2025, 5, 7, 0, 0, 1)) == "2025-05-07T00:00:01"
 
 
 def test_a_sheet_of_two_far_cells_is_refused_not_fatal(tmp_path: Path) -> None:

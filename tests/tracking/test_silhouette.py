@@ -253,3 +253,21 @@ def test_a_mark_that_goes_round_tells_the_middle():
     track = with_silhouette(found, start, [path], time)
     off = track.position_px - middle
     np.testing.assert_allclose(off, np.broadcast_to(off.mean(axis=0), off.shape), atol=0.12)
+
+
+@pytest.mark.parametrize("thread_px", [1, 2])
+def test_the_thread_that_a_ball_hangs_on_is_not_the_ball(thread_px: int) -> None:
+    angle = 0.5 * np.cos(np.arange(40) / 5)
+    path = np.stack([80 + 220 * np.sin(angle), 60 + 220 * np.cos(angle)], axis=1)
+
+    def hung(shown: np.ndarray, at: np.ndarray) -> np.ndarray:
+        ends = [
+            tuple(np.round(np.multiply(16, one)).astype(int).tolist()) for one in ((80, 60), at)
+        ]
+        return cv2.line(shown.copy(), ends[0], ends[1], 60, thread_px, cv2.LINE_AA, 4)
+
+    shown = [hung(one, at) for one, at in zip(film(path), path, strict=True)]
+    found = max(paths_of(lambda: iter(shown), np.arange(40.0)), key=lambda one: one.way_px)
+    assert len(found.frames) > 30
+    off = np.hypot(*(found.places_px - path[found.frames]).T)
+    assert off.max() < 2 * RADIUS_PX and np.median(off) < RADIUS_PX / 4
