@@ -110,8 +110,7 @@ def unseen(
         least = max(needed, max(odds.values(), default=0.0) - DECISIVE)
         in_question |= {name for name, own in odds.items() if own >= least}
     each = [one.entry() for one in beside.values()]
-    probes = np.array([probe for _, probe in each]).reshape(len(each), -1)
-    changes = changed_numbers(own, last.fit, probes) if each else []
+    changes = changed_numbers(own, last.fit, np.array([p for _, p in each])) if each else []
     entries = {
         name: entry | {"changes": changed}
         for name, (entry, _), changed in zip(beside, each, changes, strict=True)
