@@ -139,7 +139,7 @@ def comes_free(observation: Observation, last: int) -> bool:
     ]
     size, apart = float(np.linalg.norm(free)), float(np.linalg.norm(held - free))
     falls = -free[1] > abs(free[0]) and size > CLEAR * sds[1]
-    return bool(falls and apart > max(HELD * size, CLEAR * float(np.hypot(*sds))))
+    return bool(falls and apart > max(HELD * size, CLEAR * float(np.linalg.norm(sds))))
 
 
 def _window(frames: int) -> int:
