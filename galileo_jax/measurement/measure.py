@@ -39,7 +39,7 @@ from galileo_jax.measurement.path_direction import (
     way_text,
 )
 from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, segment
-from galileo_jax.measurement.segments.start_speed import on_ramp, rest_s, start_speed
+from galileo_jax.measurement.segments.start_speed import may_move, on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
 from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
@@ -226,15 +226,15 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
     seen = on_ramp(observation) if scenario.has_table else observation
     found = start_speed(seen)
     if found is None:
-        rests_s = rest_s(seen)
-        if is_declared and clip.scenario == "ramp" and rests_s is not None:
+        is_ramp = is_declared and clip.scenario == "ramp"
+        if is_ramp and (rests_s := rest_s(seen)) is not None:
             told.say(
                 f"{first.name} rests for {rests_s:.2g} s from frame {first.first_frame} on, where "
                 "it is declared to be let go; write `first_frame: null` for it, which takes the "
                 "release from the motion, or try the effect release_delay"
             )
-        # What rests shows when it is let go; else that may be before the first row of a table.
-        return moving if first.first_frame is None and rests_s is None else clip
+        # Who let go what is in a table may have done so before its first row.
+        return moving if first.first_frame is None and may_move(seen) else clip
     how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
     what_then = (
         "declare `starts_moving: true` if it was let go before, or try the effect initial_push"

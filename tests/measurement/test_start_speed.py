@@ -120,3 +120,24 @@ def test_a_picture_that_a_coder_froze_does_not_hide_a_rest(rests):
     seen_way = replace(seen_way, position_m=place, covariance_m2=covariance)
     found = rest_s(seen_way.with_modes([], [lasting]))
     assert found is not None and abs(found - rests) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("rows", "before_s", "moves"),
+    [(9, 0.08, True), (8, 0.12, True), (40, -0.15, False), (12, -0.15, False)],
+)
+def test_a_short_table_may_begin_after_the_release(tmp_path, rows, before_s, moves):
+    """Too few rows to be sure: whichever is likelier is what the fit assumes."""
+    times = np.arange(rows) / 30
+    height = 1.5 - 9.81 / 2 * np.maximum(times + before_s, 0) ** 2
+    found = []
+    for seed in range(6):
+        noise = np.random.default_rng(seed).normal(0, 2e-3, rows)
+        table = np.column_stack([times, height + noise])
+        np.savetxt(tmp_path / "fall.csv", table, "%.4f", ",", header="t (s),y (m)", comments="")
+        (tmp_path / "fall.yaml").write_text(
+            "track: fall.csv\nscenario: fall\nobjects:\n- {name: ball, shape: sphere}\n"
+        )
+        found.append(measure(load_clip(tmp_path / "fall.yaml")).clip.starts_moving)
+    wrong = sum((one is True) != moves for one in found)
+    assert wrong == 0 if moves else wrong <= 1, found

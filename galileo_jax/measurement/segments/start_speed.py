@@ -23,6 +23,7 @@ from galileo_jax.observation.observation import Observation
 
 EARLY = 0.5  # of the way
 FEWEST, TERMS = 9, 5  # places, and numbers that describe them
+TERMS_OF_FEW = 3  # without b and c
 NEAR_FOOT = 0.25  # of the way down a ramp to its table
 CLEAR = 5.0  # standard deviations
 SURE = 3.0  # the same, where it is clear that it is not let go at once
@@ -50,6 +51,18 @@ def start_speed(observation: Observation) -> StartSpeed | None:
         return None
     better = early.let_go()[0] - moves_cost
     return StartSpeed(early.sign * moving[1], sd_m_s) if better > CLEAR**2 * size else None
+
+
+def may_move(observation: Observation) -> bool:
+    """Whether a start in motion is likelier than being let go in the clip; not if nobody knows.
+
+    What would start backwards is let go later.
+    """
+    early = _first_half(observation, fewest=TERMS_OF_FEW + 2)
+    if early is None:
+        return False
+    fit = early.moving()
+    return fit.solution[1] > 0 and early.let_go()[0] > float(np.sum(fit.left**2))
 
 
 def rest_s(observation: Observation) -> float | None:
@@ -91,21 +104,26 @@ class _Way(NamedTuple):
     sd_m: np.ndarray
     sign: float  # -1: it first goes against the way of all
 
+    @property
+    def terms(self) -> int:
+        """How many numbers describe it."""
+        return TERMS if len(self.times_s) >= FEWEST else TERMS_OF_FEW
+
     def fit(self, design: np.ndarray) -> LinearFit:
         """What a design makes of it, in units of the sds."""
         return least_squares(design / self.sd_m[:, None], self.way_m / self.sd_m)
 
     def scatter(self, cost: float) -> float:
         """The variance of errors over the stated one, at least 1."""
-        return max(1.0, cost / max(len(self.times_s) - TERMS, 1))
+        return max(1.0, cost / max(len(self.times_s) - self.terms, 1))
 
     def moving(self) -> LinearFit:
         """What a start in motion makes of it."""
-        return self.fit(np.vander(self.times_s, TERMS, increasing=True))
+        return self.fit(np.vander(self.times_s, self.terms, increasing=True))
 
     def release_cost(self, release_s: float) -> float:
         """The least sum of squared errors of a release from rest at an instant."""
-        powers = np.vander(np.maximum(self.times_s - release_s, 0.0), TERMS, increasing=True)
+        powers = np.vander(np.maximum(self.times_s - release_s, 0.0), self.terms, increasing=True)
         return float(np.sum(self.fit(np.delete(powers, 1, axis=1)).left ** 2))
 
     def let_go(self) -> tuple[float, float]:
@@ -132,13 +150,13 @@ class _Way(NamedTuple):
         return (cost, release_s) if is_later and moving_cost - cost > SURE**2 * size else None
 
 
-def _first_half(observation: Observation) -> _Way | None:
-    """Of object 1; None where too little of it is seen."""
+def _first_half(observation: Observation, fewest: int = FEWEST) -> _Way | None:
+    """Of object 1; None where it is seen in fewer places."""
     seen = np.flatnonzero(observation.mask[0])
     place_m = observation.position_m[0][:, seen]
     gone = place_m - place_m[:, :1]
     distance = np.linalg.norm(gone, axis=0)
-    if len(seen) < FEWEST or not distance.max() > 0:
+    if len(seen) < fewest or not distance.max() > 0:
         return None
     farthest = int(np.argmax(distance))
     along = gone[:, farthest] / distance[farthest]
