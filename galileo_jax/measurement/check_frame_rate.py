@@ -98,6 +98,8 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
     place = observation.position_m[0, :2][:, seen]
     gone = place - place[:, :1]
     furthest = gone[:, int(np.argmax(np.hypot(*gone)))]
+    if not furthest.any():
+        return None
     times = observation.times_s[seen]
     fit = polynomial(times - times[0], furthest @ gone / np.hypot(*furthest), 2)
     variance = float(np.sum(fit.left**2)) / (len(times) - 3) * float(fit.inverse[0, 0])
