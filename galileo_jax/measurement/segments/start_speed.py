@@ -56,10 +56,10 @@ def start_speed(observation: Observation) -> StartSpeed | None:
 def may_move(observation: Observation) -> bool:
     """Whether a start in motion is likelier than being let go in the clip; not if nobody knows.
 
-    What would start backwards is let go later.
+    What would start backwards is let go later, and what first goes the other way is in a hand.
     """
     early = _first_half(observation, fewest=TERMS_OF_FEW + 2)
-    if early is None:
+    if early is None or early.sign < 0:
         return False
     fit = early.moving()
     return fit.solution[1] > 0 and early.let_go()[0] > float(np.sum(fit.left**2))
