@@ -15,6 +15,7 @@ from galileo_jax.clip.load import check_clip, yaml_of
 from galileo_jax.clip.look import LEVEL_DEG, Likely, Seen, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS, Scenario
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_axes import goes_right
 from galileo_jax.clip.track_csv import MAX_STEP_S
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
@@ -295,7 +296,7 @@ def _followed(known: Understood, point: Point) -> FilmPath:
     variance = np.trace(track.covariance_px2[0], axis1=-2, axis2=-1)[seen] / 2
     path = PointPath(seen, track.times_s[seen], track.position_px[0][seen].T, variance)
     x = path.place_m[0]
-    direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
+    direction = "right" if goes_right(x) else "left"
     return FilmPath(_likely_between_rests(path), direction, path.place_m, path.frames)
 
 

@@ -73,6 +73,11 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
     return None if value == 0 else "up" if value > 0 else "down"
 
 
+def goes_right(x: np.ndarray) -> bool:
+    """Whether the place farthest from the first of `x` `[row]` lies to its right."""
+    return bool(x[np.argmax(np.abs(x - x[0]))] >= x[0])
+
+
 def _against_pull(times: np.ndarray, place: np.ndarray) -> float:
     """Which way is up for what went this way and came back, in the sign.
 

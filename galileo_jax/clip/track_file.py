@@ -18,6 +18,7 @@ from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.track_axes import (
     along_line,
     check_falls_down,
+    goes_right,
     in_plane,
     observed_where_finite,
     swung,
@@ -252,8 +253,7 @@ def _direction_of(of: DeclaredTrack, table: TrackTable) -> tuple[str, tuple[str,
     if "direction" in of.file.model_fields_set or not of.scenario.has_ramp:
         return declared, ()
     x = table.position[0, 0][np.isfinite(table.position[0]).all(axis=0)]
-    gone = x - x[:1]
-    found = "left" if gone.size and gone[np.argmax(np.abs(gone))] < 0 else "right"
+    found = "right" if not x.size or goes_right(x) else "left"
     if found == declared:
         return declared, ()
     return found, (f"{of.path}: direction: {found}, as the motion shows; declare it if it is not",)

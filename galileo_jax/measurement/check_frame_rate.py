@@ -102,8 +102,7 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
         return None
     times = observation.times_s[seen]
     fit = polynomial(times - times[0], furthest @ gone / np.hypot(*furthest), 2)
-    variance = float(np.sum(fit.left**2)) / (len(times) - 3) * float(fit.inverse[0, 0])
-    found, sd, angle = 2 * float(fit.solution[0]), 2 * math.sqrt(variance), clip.ramp_angle_deg
+    found, sd, angle = 2 * float(fit.solution[0]), 2 * float(fit.sds[0]), clip.ramp_angle_deg
     found *= -1.0 if furthest[1] > 0 and angle else 1.0  # up the board
     most, rate = (clip.gravity * f(math.radians(angle)) for f in (math.sin, math.cos))
     known = math.hypot(sd, rate * math.radians(math.hypot(LEVEL_SD_DEG, clip.ramp_angle_sd_deg)))
@@ -166,8 +165,7 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
     # Of Fisher's F with 2 and `size` degrees of freedom: P(F > x) = (1 + 2 x / size)^(-size / 2).
     if gain > size / 2 * (CHANCE ** (-2 / size) - 1):
         return found
-    variance = left / (len(times) - 3) * float(parabola.inverse[0, 0])
-    gravity, sd = -2 * float(parabola.solution[0]), 2 * math.sqrt(variance)
+    gravity, sd = -2 * float(parabola.solution[0]), 2 * float(parabola.sds[0])
     return ApparentGravity(gravity, sd=sd, is_parabola=True)
 
 

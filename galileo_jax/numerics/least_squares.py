@@ -22,6 +22,13 @@ class LinearFit:
         """The covariance of the solution where the errors of the values have unit variance."""
         return np.linalg.inv(self.design.T @ self.design)
 
+    @property
+    def sds(self) -> np.ndarray:
+        """Of the solution `[term, ...]`, by the size of what is left."""
+        rows, terms = self.design.shape
+        variance = np.sum(self.left**2, axis=0) / (rows - terms)
+        return np.sqrt(np.multiply.outer(np.diagonal(self.inverse), variance))
+
 
 def least_squares(design: Float[np.ndarray, "row term"], values: np.ndarray) -> LinearFit:
     """The solution that leaves the least sum of squares of values, `[row, ...]`."""

@@ -182,8 +182,8 @@ def _worst(told: Mapping[str, Any]) -> list[tuple[str, str | None]]:
     """
     sizes: dict[tuple[str, str | None], float] = {(name, None): 0.0 for name in told}
     for name, one in told.items():
-        strength = one["strength"] or one.get("usual") or 1.0
-        share = min((one.get("usual") or strength) / strength, 1.0)
+        strength = one["strength"]
+        share = 1.0 if strength is None else min(one.get("usual", strength) / strength, 1.0)
         for number, changed in one.get("changes", {}).items():
             sizes[name, number] = share * abs(changed["sds"])
     chosen: dict[str, str | None] = {}

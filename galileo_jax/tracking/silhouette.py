@@ -182,12 +182,12 @@ def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
             continue
         part = Part(centre, float(area), low, end - 1)
         if area < FILLS * wide * high:
-            part = _thick(labels[top : top + high, left : left + wide] == label, low)
+            part = _thick(part, labels[top : top + high, left : left + wide] == label)
         found.append(part)
     return sorted(found, key=lambda part: -part.area_px2)[:MOST_PARTS]
 
 
-def _thick(mask: np.ndarray, low_px: np.ndarray) -> Part:
+def _thick(part: Part, mask: np.ndarray) -> Part:
     """The largest piece of a part that is half as thick as its thickest place or more.
 
     A ball without the thread that it hangs on, or a box without the edge of its shadow.
@@ -199,9 +199,9 @@ def _thick(mask: np.ndarray, low_px: np.ndarray) -> Part:
     opened = cv2.morphologyEx(padded, cv2.MORPH_OPEN, kernel)
     _, _, stats, centres = cv2.connectedComponentsWithStats(opened)
     if len(stats) < 2:
-        opened = padded
-        _, _, stats, centres = cv2.connectedComponentsWithStats(opened)
+        return part
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     left, top, wide, high, area = stats[largest].tolist()
-    low = low_px + np.array([left, top]) - 1
-    return Part(centres[largest] + low_px - 1, float(area), low, low + np.array([wide, high]) - 1)
+    corner = part.low_px - 1
+    low = corner + np.array([left, top])
+    return Part(centres[largest] + corner, float(area), low, low + np.array([wide, high]) - 1)

@@ -225,6 +225,13 @@ def table_of(
     return path
 
 
+def board_table(folder: Path, times: np.ndarray, gone: np.ndarray, angle_deg: int) -> Path:
+    """The same of what has gone so far down a board."""
+    angle = np.radians(angle_deg)
+    place = np.stack([gone * np.cos(angle), 0.8 - gone * np.sin(angle)])
+    return table_of(folder, "incline", times, place, f"ramp_angle_deg: {angle_deg}\n")
+
+
 @pytest.mark.parametrize(
     ("rests_s", "hand_s", "gently"),
     [(0.0, 0.25, False), (0.0, 0.4, True), (0.6, 0.2, False), (0.3, 0.3, True)],
@@ -249,9 +256,7 @@ def test_a_push_on_a_board_too_rough_to_slide_is_left_out(tmp_path) -> None:
     times, off_s, push, slows = np.arange(90) / 60, 0.2, 6.0, 1.6
     pushed, free = np.clip(times, 0, off_s), np.clip(times - off_s, 0, push * off_s / slows)
     gone = push * pushed**2 / 2 + push * off_s * free - slows * free**2 / 2
-    angle = np.radians(12.0)
-    place = np.stack([gone * np.cos(angle), 0.5 - gone * np.sin(angle)])
-    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 12\n")
+    path = board_table(tmp_path, times, gone, 12)
     (cut,) = measure(load_clip(path)).cuts
     assert (cut.side, cut.why) == ("before", PUSHED) and off_s < cut.time_s < off_s + 0.15
 
@@ -261,9 +266,7 @@ def test_what_a_brake_slows_on_its_way_was_not_pushed(tmp_path) -> None:
     times, on_s, gains, slows = np.arange(90) / 60, 0.7, 1.5, 1.2
     fast, slow = np.clip(times, 0, on_s), np.clip(times - on_s, 0, gains * on_s / slows)
     gone = gains * fast**2 / 2 + gains * on_s * slow - slows * slow**2 / 2
-    angle = np.radians(20.0)
-    place = np.stack([gone * np.cos(angle), 0.5 - gone * np.sin(angle)])
-    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 20\n")
+    path = board_table(tmp_path, times, gone, 20)
     assert not [cut for cut in measure(load_clip(path)).cuts if cut.side == "before"]
 
 
@@ -276,9 +279,7 @@ def test_who_carries_it_back_up_is_left_out_and_up_stays_up(tmp_path, wobble_m) 
     gone = speeds_up * free**2 / 2 + speeds_up * (caught_s - off_s) * stopped
     gone = gone + wobble_m * np.sin(10.7 * times) * (times < off_s)
     gone = np.maximum(gone - 0.5 * np.clip(times - 2.0, 0, None), 0)
-    angle = np.radians(23.0)
-    place = np.stack([gone * np.cos(angle), 0.8 - gone * np.sin(angle)])
-    path = table_of(tmp_path, "incline", times, place, "ramp_angle_deg: 23\n")
+    path = board_table(tmp_path, times, gone, 23)
     measured = measure(load_clip(path))
     assert not any("track_y" in line or "direction" in line for line in measured.warnings)
     used = measured.segments.within(times)

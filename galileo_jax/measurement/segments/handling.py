@@ -132,11 +132,7 @@ def comes_free(observation: Observation, last: int) -> bool:
         return False
     fits = [polynomial(part.times_s - part.times_s[0], part.place_m.T, 2) for part in parts]
     held, free = (2 * fit.solution[0] for fit in fits)
-    sds = [
-        2
-        * float(np.sqrt(np.mean(np.sum(fit.left**2, axis=0)) / (len(part) - 3) * fit.inverse[0, 0]))
-        for fit, part in zip(fits, parts, strict=True)
-    ]
+    sds = [2 * float(np.sqrt(np.mean(fit.sds[0] ** 2))) for fit in fits]
     size, apart = float(np.linalg.norm(free)), float(np.linalg.norm(held - free))
     falls = -free[1] > abs(free[0]) and size > CLEAR * sds[1]
     return bool(falls and apart > max(HELD * size, CLEAR * float(np.linalg.norm(sds))))

@@ -22,7 +22,7 @@ what is no more the object that was marked is `Astray`.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -177,17 +177,17 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
 
 def _first_free(clip: Clip, observation: Observation) -> int | None:
     """The first frame after a hand's last jump, in what falls or flies; None without one."""
-    last = _blow_finder(clip, observation)(observation)
+    last = _blow_frame(clip, observation)
     if last is None or not handling.comes_free(observation, last):
         return None
     seen = np.flatnonzero(observation.mask[0])
     return int(seen[int(np.searchsorted(seen, last)) + 1 + blow.SMEARED])
 
 
-def _blow_finder(clip: Clip, observation: Observation) -> Callable[[Observation], int | None]:
-    """What finds the last frame before a blow."""
+def _blow_frame(clip: Clip, observation: Observation) -> int | None:
+    """The last frame before object 1 is struck, or bounces."""
     is_in_space = clip.scenario == "flight" and len(observation.axes) == 3
-    return blow.bounce_frame if is_in_space else blow.blow_frame
+    return blow.bounce_frame(observation) if is_in_space else blow.blow_frame(observation)
 
 
 def _down_m_s2(clip: Clip, observation: Observation) -> float | None:
@@ -216,7 +216,7 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
     if SCENARIOS[clip.scenario].has_ramp:
         ends.append((end_of_slope(observation), SLOPE_ENDS))
     if is_board or is_free or is_swing:
-        ends.append((_blow_finder(clip, observation)(observation), STRUCK))
+        ends.append((_blow_frame(clip, observation), STRUCK))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:
         return None, ""
