@@ -174,7 +174,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
     seen = known.look.seen
     if seen is None or seen.unit is not None or seen.axes == ("angle",):
         return None
-    if known.declared.get("pixels_per_metre") is not None:
+    if any(one.get("pixels_per_metre") is not None for one in (known.declared, answers)):
         return None
     text, choices = "In which unit are its lengths?", (*METRES_PER_UNIT, "px")
     unit, size = _unit_by_gravity(known, answers), max(seen.moved)

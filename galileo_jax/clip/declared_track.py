@@ -65,7 +65,11 @@ def _one_motion(of: DeclaredTrack, table: TrackTable) -> TrackTable:
         )
     if trial is not None and trial > count:
         raise of.wrong_key(f"trial: {trial}, but {of.path.name} has {count}; 1 to {count} expected")
-    return table.motion(trial or 1)
+    motion = table.motion(trial or 1)
+    if count == 1:
+        return motion
+    said = f"{of.path}: motion {trial} of {count} (`trial` tells which)"
+    return replace(motion, warnings=(*motion.warnings, said))
 
 
 def _joined(paths: Sequence[Path], tables: Sequence[TrackTable]) -> TrackTable:

@@ -178,6 +178,13 @@ def along_line(
     return replace(on_line, rows_of_noise=len(times))
 
 
+def way_alone(of: DeclaredTrack, axis: str) -> tuple[str, ...]:
+    """What is said of one coordinate down a slope: it may be meant across the picture, or up it."""
+    if of.scenario.line != "slope" or axis == "line":
+        return ()
+    return (f"{of.path}: {axis} alone is taken for the way down the slope",)
+
+
 def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
     """1 or -1: by which a way `[row]` counts down the slope, along the level, or up."""
     seen = np.isfinite(way)

@@ -23,6 +23,7 @@ from galileo_jax.clip.track_axes import (
     observed_where_finite,
     swung,
     up_from_motion,
+    way_alone,
 )
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
@@ -161,6 +162,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     elif len(table.axes) == 1:
         start = table.position[0, 0, 0] if is_px else 0.0
         way = (table.position[:, 0] - start) * metres
+        said = way_alone(of, table.axes[0])
         observation = along_line(of, table.axes[0], times, way, _last_place_m(table, metres)[0])
     else:
         table, turned = in_plane(of, table)

@@ -41,7 +41,7 @@ from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views
 from galileo_jax.diagnosis.reasons import because
 from galileo_jax.diagnosis.remarks import with_known_constants, with_second
 from galileo_jax.diagnosis.stakes import VerdictStakes, decisive_margin
-from galileo_jax.diagnosis.thresholds import CONVINCING
+from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.diagnosis.verdict import (
     AS_EFFECTS,
     UNEVEN,
@@ -215,16 +215,19 @@ def _concluded(
     """What is missing, where something is; `is_adequate`: the model without effects."""
     judge.on_stage("comparing the best candidates with the data")
     candidates = judge.compared(candidates)
-    rough = None
+    rough = settled = None
     if not is_adequate:
         judge.on_stage("allowing for imperfections")
         rough = imperfect_world(judge, table.base)
     if rough is not None and not rough.is_beaten_by(candidates):
         rough = rough.with_candidates(candidates)
-        verdict = rough.verdict()
-        is_uneven = bool(set(verdict.effects) & set(AS_EFFECTS.values()))
-        if verdict.status != "unknown" and not is_uneven:
-            return _Conclusion(verdict, rough.with_the_rest(candidates), (), rough)
+        settled = _settled(rough, candidates)
+    if settled is not None and not settled.verdict.effects:
+        return settled
+    judge.on_stage("fitting pairs of effects")
+    table = search(table, 2, listener.on_entry)
+    if settled is not None and rough is not None and not _is_contested(rough, table):
+        return settled
     # A pair or a formula may explain it.
     why, found = _searched(table, judge, candidates, listener)
     verdict, candidates = found.verdict, found.candidates
@@ -238,19 +241,38 @@ def _concluded(
     return _Conclusion(verdict, candidates, found.views, rough)
 
 
+def _settled(rough: ImperfectWorld, candidates: Sequence[Candidate]) -> _Conclusion | None:
+    """What is missing in an imperfect world; None where formulas may be needed to tell."""
+    verdict = rough.verdict()
+    is_uneven = bool(set(verdict.effects) & set(AS_EFFECTS.values()))
+    if verdict.status == "unknown" or is_uneven:
+        return None
+    return _Conclusion(verdict, rough.with_the_rest(candidates), rough=rough)
+
+
+def _is_contested(rough: ImperfectWorld, table: Table) -> bool:
+    """Whether two effects in an exact world are about as probable as the best of the imperfect one.
+
+    Imperfections of usual sizes beside one effect may stand for a second.
+    """
+    base, best = rough.base.fit.log_evidence, rough.table[0].log_odds
+    return any(
+        pair.fit.log_evidence + table.stakes.log_prior(pair) - base > best - DECISIVE
+        for pair in table.named(2)
+    )
+
+
 def _searched(
     table: Table, judge: Judge, candidates: tuple[Candidate, ...], listener: _Listener
 ) -> tuple[list[Reason], _Conclusion]:
     """Pairs and, where these or what they say is not enough, formulas, in an exact world.
 
-    `candidates` are those of single effects, compared with the data.
+    `candidates` are those of single effects, compared with the data; the table has pairs, too.
 
     Returns:
       Why pairs were tried, and what came of it; and the conclusion.
     """
     singles = candidates
-    judge.on_stage("fitting pairs of effects")
-    table = search(table, 2, listener.on_entry)
     candidates = listener.on_table(table)
     judge.on_stage("comparing the best pairs with the data")
     candidates = judge.compared(candidates)

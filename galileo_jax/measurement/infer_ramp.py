@@ -126,26 +126,22 @@ def _at_start_deg(points: np.ndarray, line: Line) -> float:
 def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
     """Where the ramp meets the table, `[2]`, m, in the observation's axes.
 
+    An object without a size is taken to be as high as long: with another height all of the table is
+    higher by as much, and moves alike.
+
     Args:
-      clip: with the size of its first object.
+      clip: the clip.
       observation: of any origin.
 
     Raises:
-      InputError: the size is unknown, or the path does not bend.
+      InputError: the path does not bend.
     """
-    first = clip.objects[0]
-    remedy = "set it with `galileo label --origin X Y`"
-    if first.size_m is None:
-        raise InputError(
-            f"{clip.path}: origin_px: null, and {first.name}'s size_m is null, too; the foot of "
-            f"the path shows the ramp only together with its height; {remedy}"
-        )
-    half_length, half_height = extents(first)
+    half_length, half_height = _first_extents(clip, observation)
     found = _bend(observation, half_length)
     if found is None:
         raise InputError(
-            f"{clip.path}: origin_px: null, and {first.name}'s path does not bend: the foot of the "
-            f"ramp is not declared; {remedy}"
+            f"{clip.path}: origin_px: null, and {clip.objects[0].name}'s path does not bend: the "
+            "foot of the ramp is not declared; set it with `galileo label --origin X Y`"
         )
     bend, half_angle = found
     return bend - half_height * np.array([math.tan(half_angle), 1.0])
@@ -155,24 +151,28 @@ def foot_of_table(clip: Clip, observation: Observation) -> np.ndarray | None:
     """Where the foot is in a table, `[2]`, m; None where it is the origin, or does not show.
 
     Whoever measured chose the origin. It may be the foot where the path bends at (h tan(a/2), h),
-    h that of the first object, or any where that is unknown. Else an object without a size is taken
-    to be as high as long: with another h all of the table is higher by as much, and moves alike.
+    h that of the first object, or any where that is unknown. Else as `infer_foot`.
     """
-    first = clip.objects[0]
-    if first.size_m is None:
-        apart = distance_at_hit(observation, 0) if len(clip.objects) > 1 else None
-        half_length = half_height = max(apart or 0.0, MIN_SIZE_M) / 2
-    else:
-        half_length, half_height = extents(first)
+    half_length, half_height = _first_extents(clip, observation)
     found = _bend(observation, half_length)
     if found is None:
         return None
     bend, half_angle = found
     shift = np.array([math.tan(half_angle), 1.0])
-    height = half_height if first.size_m else float(np.clip(bend[1], 0.0, MAX_SIZE_M / 2))
+    is_known = clip.objects[0].size_m is not None
+    height = half_height if is_known else float(np.clip(bend[1], 0.0, MAX_SIZE_M / 2))
     if np.linalg.norm(bend - height * shift) < SAME_FOOT_SDS * SIZE_SD_M:
         return None
     return bend - half_height * shift
+
+
+def _first_extents(clip: Clip, observation: Observation) -> tuple[float, float]:
+    """Half the first object's length along the travel and half its height, m."""
+    if (first := clip.objects[0]).size_m is not None:
+        return extents(first)
+    apart = distance_at_hit(observation, 0) if len(clip.objects) > 1 else None
+    half = max(apart or 0.0, MIN_SIZE_M) / 2
+    return half, half
 
 
 def _bend(observation: Observation, half_length_m: float) -> tuple[np.ndarray, float] | None:

@@ -30,6 +30,7 @@ class Columns:
     meanings: tuple[Title, ...]
     numbers: dict[int, Numbers]
     warnings: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()  # what the numbers of a column of objects stand for
 
     def of(self, role: str) -> list[int]:
         """The places of the columns with a role."""
@@ -56,8 +57,9 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
         meanings[left[0]] = replace(alone, role="angle" if alone.unit in RADIANS else "line")
     has_clock = any(one.role in ("time", "frame") for one in meanings)
     has_place = any(one.role in PLACES for one in meanings)
-    asked = [n for n, one in enumerate(meanings) if one.role or
-             (n in left and not (has_clock and has_place))]  # fmt: skip
+    asked = [n for n, one in enumerate(meanings)
+             if (one.role and (one.role != "object" or _may_be_used(heading, n)))
+             or (n in left and not (has_clock and has_place))]  # fmt: skip
     # Whatever it is called, a column of dates or of clocks is the time where no other is.
     tried = (
         asked if has_clock else sorted({*asked, *(n for n, m in enumerate(meanings) if not m.role)})
@@ -73,7 +75,7 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     # What was called a place, or was the only column, may have turned out to be the time.
     if not any(one.role in PLACES for one in columns.meanings):
         columns = _with_places(columns)
-    return _with_likelihoods(_swapped_back(columns))
+    return _with_labels(_with_likelihoods(_swapped_back(_with_other_axis(columns))))
 
 
 def _parsed(heading: Heading, which: list[int]) -> dict[int, Numbers]:
@@ -156,6 +158,28 @@ def _with_places(columns: Columns) -> Columns:
     return columns.given(given, f"read by order: {', '.join(taken)}")
 
 
+def _with_other_axis(columns: Columns) -> Columns:
+    """The columns with one of a length, called in words nobody knows, as y beside x, or x beside y.
+
+    Where there is one place alone, and one such column.
+    """
+    places = [(n, role) for role in PLACES for n in columns.of(role)]
+    if len(places) != 1 or places[0][1] not in ("x", "y"):
+        return columns
+    at, role = places[0]
+    unit = columns.meanings[at].unit
+    free = [n for n, one in enumerate(columns.meanings)
+            if not one.role and unit in LENGTHS and one.unit == unit
+            and _may_be_used(columns.heading, n)]  # fmt: skip
+    if len(free) != 1:
+        return columns
+    other, name = "y" if role == "x" else "x", columns.name_of(free[0])
+    columns = replace(columns, numbers=columns.numbers | _parsed(columns.heading, free))
+    return columns.given(
+        {free[0]: other}, f"{name!r} beside {columns.name_of(at)!r} is read as {other}"
+    )
+
+
 def _with_likelihoods(columns: Columns) -> Columns:
     """The columns with those that say how sure a program was of x and y, whatever their title."""
     meanings = columns.meanings
@@ -182,6 +206,27 @@ def _with_likelihoods(columns: Columns) -> Columns:
     )
     numbers, warnings = columns.numbers | found, (*columns.warnings, said)
     return replace(columns, meanings=named, numbers=numbers, warnings=warnings)
+
+
+def _with_labels(columns: Columns) -> Columns:
+    """The columns with one of words as that of objects, where these tell rows of one time apart."""
+    clock = [n for role in ("time", "frame") for n in columns.of(role)][:1]
+    if not clock or columns.of("object"):
+        return columns
+    times = columns.numbers[clock[0]].values.tolist()
+    if len(set(times)) == len(times):
+        return columns
+    for n in set(range(len(columns.meanings))) - set(columns.numbers):
+        words = [row[n] if n < len(row) else "" for _, row in columns.heading.body]
+        labels = list(dict.fromkeys(words))
+        if "" in labels or len(labels) < 2 or len(set(zip(words, times, strict=True))) < len(times):
+            continue
+        numbers = Numbers(np.array([labels.index(word) for word in words], float), math.nan)
+        named = columns.given(
+            {n: "object"}, f"{columns.name_of(n)!r} tells {len(labels)} objects apart"
+        )
+        return replace(named, numbers=named.numbers | {n: numbers}, labels=tuple(labels))
+    return columns
 
 
 def _is_sureness(numbers: Numbers) -> bool:

@@ -17,7 +17,7 @@ from galileo_jax.table.text import content_of, decoded
 
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,|])\s*", re.IGNORECASE)  # Excel's own first line
-COMMENT = re.compile(r"\s*(#+|%+|//)\s?")
+COMMENT = re.compile(r"\s*(#+|%+|!+|//)\s?")
 SAMPLE = 60  # lines that tell the dialect; from the middle on, where no titles are
 MAX_CELLS, MAX_LINE = 4_000_000, 200_000
 MAX_COLUMNS = 1000

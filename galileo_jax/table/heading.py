@@ -201,7 +201,8 @@ def _names(rows: list[list[str]], width: int) -> list[str]:
     for row in rows:
         if not any(row) or row[0].lower().lstrip("#") == MULTI or _has_number(row):
             continue
-        names, last = [], ""
+        names = []
+        last = next(filter(None, row)) if sum(map(bool, row)) == 1 else ""  # of one object
         for n in range(width):
             last = row[n] if n < len(row) and row[n] else last
             names.append(last.replace("_", " "))

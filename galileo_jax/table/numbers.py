@@ -25,6 +25,9 @@ NOTHING = frozenset(
 
 PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 COMMA = re.compile(r"[-+]?(\d+,\d+|,\d+)(e[-+]?\d+)?", re.IGNORECASE)
+FORTRAN = re.compile(r"(?<=[\d.])d(?=[-+]?\d+$)", re.IGNORECASE)
+"""The exponent of a number in double precision: 1.5D-03."""
+
 LARGEST = 1e20  # of a number: as many nanoseconds are 3,000 years
 PLAIN_LETTERS = frozenset("0123456789.+-eE")
 MOST_LOOKED_AT = 500  # rows: a column is of one kind, and printed in one way
@@ -54,8 +57,8 @@ class Numbers:
 
 
 def plain(cell: str) -> str:
-    """A cell without typographic spaces and minus signs."""
-    return cell.translate(SPACES).strip().strip("'")
+    """A cell without typographic spaces and minus signs, its exponent after an e."""
+    return FORTRAN.sub("e", cell.translate(SPACES).strip().strip("'"))
 
 
 def is_nothing(cell: str) -> bool:

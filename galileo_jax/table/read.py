@@ -282,4 +282,5 @@ def _by_object(
             f"{columns.name_of(at)}: the same particle twice at one time; one row for each "
             "particle and frame expected"
         )
-    return tuple(f"{one:g}" for one in ids), found, times
+    names = (columns.labels[int(one)] if columns.labels else f"{one:g}" for one in ids)
+    return tuple(names), found, times

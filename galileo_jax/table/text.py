@@ -24,6 +24,8 @@ ENCODINGS = (
     *("cp1251", "cp1250", "cp1253", "cp1254", "mac_roman", "koi8_r", "cp437"),
 )
 HEAD_BYTES = 4096  # titles are at the top
+# Of East Asian keyboards: as wide as a character, and else the same.
+FULL_WIDTH = {wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F)} | {0x3000: " "}
 
 
 def content_of(path: Path) -> bytes:
@@ -54,7 +56,7 @@ def decoded(content: bytes) -> str:
     """
     for mark, encoding in MARKS:
         if content.startswith(mark):
-            return content.decode(encoding, errors="replace")
+            return _text(content.decode(encoding, errors="replace"))
     if b"\0" in content:
         return _without_mark(content)
     try:
@@ -65,7 +67,7 @@ def decoded(content: bytes) -> str:
     best, most = ENCODINGS[0], (-1, 0.0)
     for encoding in ENCODINGS:
         try:
-            text = head.decode(encoding)
+            text = head.decode(encoding).translate(FULL_WIDTH)
         except UnicodeDecodeError:
             continue
         beyond = [letter for letter in text if letter > "\x7f"]
@@ -80,13 +82,13 @@ def _without_mark(content: bytes) -> str:
     even, odd = content[0:HEAD_BYTES:2], content[1:HEAD_BYTES:2]
     for encoding, nulls, other in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
         if nulls.count(0) > 0.8 * len(nulls) and other.count(0) < 0.1 * len(other):
-            return content.decode(encoding, errors="replace")
+            return _text(content.decode(encoding, errors="replace"))
     raise InputError(f"not a text: a byte 0 at {content.index(0)}; a table expected")
 
 
 def _text(text: str) -> str:
-    """The text, unless it is full of what no table has."""
+    """The text in letters of the usual width, unless it is full of what no table has."""
     strange = re.findall(r"[\x01-\x08\x0e-\x1a\x1c-\x1f\x7f]", text[:HEAD_BYTES])
     if len(strange) > 0.02 * len(text[:HEAD_BYTES]):
         raise InputError("not a text, full of control characters; a table expected")
-    return text
+    return text.translate(FULL_WIDTH)

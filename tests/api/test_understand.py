@@ -58,6 +58,7 @@ def test_an_answer_settles_its_question_and_what_hangs_on_it(tmp_path):
     assert keys(path, scenario="incline") == ["track_units", "ramp_angle_deg"]
     assert keys(path, scenario="fall") == ["track_units"], "a fall has no ramp"
     assert keys(path, scenario="incline", track_units="m", ramp_angle_deg=20.0) == []
+    assert keys(path, scenario="incline", pixels_per_metre=500.0, ramp_angle_deg=20.0) == []
 
 
 @pytest.mark.parametrize(

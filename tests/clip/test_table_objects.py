@@ -66,7 +66,9 @@ def drops(folder: Path, trial: str) -> Path:
 
 @pytest.mark.parametrize(("trial", "top", "rows"), [(1, 2.0, 30), (2, 3.0, 20), (3, 4.0, 30)])
 def test_one_of_the_motions_in_a_table(trial: int, top: float, rows: int, tmp_path: Path) -> None:
-    seen, _ = observed(load_clip(drops(tmp_path, f"trial: {trial}\n")))
+    clip = load_clip(drops(tmp_path, f"trial: {trial}\n"))
+    assert any(f"motion {trial} of 3" in line for line in clip.warnings)
+    seen, _ = observed(clip)
     assert len(seen.times_s) == rows
     assert seen.position_m[0, 1, 0] == pytest.approx(top, abs=6 * NOISE_M)
 

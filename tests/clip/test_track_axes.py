@@ -52,6 +52,13 @@ def test_the_way_down_a_slope(columns: dict[str, np.ndarray], tmp_path: Path) ->
     assert 1e-4 < sd[0] < 6e-4  # 3e-4 was put in
 
 
+@pytest.mark.parametrize(("title", "said"), [("x (m)", True), ("s (m)", False)])
+def test_an_axis_alone_is_said_to_be_taken_for_the_way(title, said, tmp_path: Path) -> None:
+    observed(tmp_path, {"t (s)": T, title: WAY}, "scenario: incline\nramp_angle_deg: 10")
+    lines = load_clip(tmp_path / "a.yaml").warnings
+    assert any("alone is taken for the way down the slope" in line for line in lines) == said
+
+
 def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:
     columns = {"t (s)": T, "x (m)": -FALL, "y (m)": NOISE[1]}
     with pytest.raises(InputError, match=r"falls along \+x, .* write track_up: -x"):

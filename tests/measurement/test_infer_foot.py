@@ -80,7 +80,6 @@ def test_a_first_look_follows_the_disc_that_fits_into_a_box(tmp_path: Path) -> N
 @pytest.mark.parametrize("change, words", [
     ({"angle_deg": 1.5}, "path does not bend"),
     ({"num_frames": 15}, "path does not bend"),
-    ({"size": "null"}, "object1's size_m is null, too"),
 ])  # fmt: skip
 def test_what_cannot_be_told_is_one_line(change: dict, words: str, tmp_path: Path) -> None:
     clip = load_clip(write_track(tmp_path, **change))
@@ -88,6 +87,16 @@ def test_what_cannot_be_told_is_one_line(change: dict, words: str, tmp_path: Pat
         measure(clip)
     assert words in str(caught.value)
     assert "galileo label --origin" in str(caught.value)
+
+
+def test_a_body_without_a_size_is_taken_to_be_as_high_as_long(tmp_path: Path) -> None:
+    """Where its centre goes along the table is then the table."""
+    measured = measure(load_clip(write_track(tmp_path, size="null")))
+    assert measured.clip.origin_px is not None
+    x, y = measured.clip.origin_px
+    shift = np.array([math.tan(math.radians(10)), 1.0]) * HALF_HEIGHT_M * SCALE_PX_PER_M
+    assert (x, y) == pytest.approx(FOOT_PX + shift * [1, -1], abs=1.5)
+    assert np.median(measured.observation.position_m[0, 1, -5:]) == pytest.approx(0.0, abs=2e-3)
 
 
 TABLE = """\

@@ -167,6 +167,19 @@ def test_every_encoding(encoding: str, heading: str, tmp_path: Path) -> None:
     assert titles == heading.split("\n")[-1].split(",")
 
 
+def test_letters_as_wide_as_characters_are_letters(tmp_path: Path) -> None:
+    content = text("时间(秒),水平(cm),高度(cm)")
+    wide = content.translate({one: one + 0xFEE0 for one in range(0x21, 0x7F)})
+    table = read(tmp_path, wide.encode("gbk"))
+    assert table.unit == "cm"
+    check(table)
+
+
+def test_exponents_of_double_precision(tmp_path: Path) -> None:
+    body = lines("   ", form=lambda v: f"{v:.{DIGITS + 2}E}".replace("E", "D"))
+    check(read(tmp_path, text("! t[s]  x[m]  y[m]", body=body), "dat"))
+
+
 def test_a_unit_in_an_old_encoding_is_a_unit(tmp_path: Path) -> None:
     """Statistics of letters take it for another one."""
     body = [f"{40000 * n},{x},{y}" for n, (_, x, y) in enumerate(truth().T)]
@@ -285,6 +298,32 @@ def test_a_row_for_each_particle(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.position[0], truth()[1:])
     assert np.isnan(table.position[1, :, 3]).all()
     np.testing.assert_allclose(np.delete(table.position[1, 0], 3), np.delete(truth()[1] + 7, 3))
+
+
+def test_words_tell_the_bodies_of_a_row_for_each_apart(tmp_path: Path) -> None:
+    """Whatever their title is; words beside times that come once are remarks."""
+    rows = [f"{t};{name};{x + n};{y}" for t, x, y in truth().T for n, name in enumerate(("Q", "B"))]
+    table = read(tmp_path, text("t (s);Kloß;x (m);y (m)", body=rows[:3] + rows[4:]))
+    assert table.names == ("Q", "B") and "2 objects" in table.warnings[0]
+    check(table)
+    assert np.isnan(table.position[1, :, 1]).all()
+    np.testing.assert_allclose(np.delete(table.position[1, 0], 1), np.delete(truth()[1] + 1, 1))
+    remarks = [f"{t};{'up' if n < 8 else 'down'};{x};{y}" for n, (t, x, y) in enumerate(truth().T)]
+    check(read(tmp_path, text("t (s);what;x (m);y (m)", body=remarks)))
+
+
+def test_a_name_above_one_column_is_that_of_all(tmp_path: Path) -> None:
+    table = read(tmp_path, text(",,block", "t in s,x in m,y in m"))
+    assert table.names == ("block",)
+    check(table)
+
+
+def test_a_length_in_unknown_words_beside_one_axis_is_the_other(tmp_path: Path) -> None:
+    """With a unit: else it may be anything."""
+    table = read(tmp_path, text("t (s);x (cm);quer (cm)", body=SEMI))
+    assert table.axes == ("x", "y") and "read as y" in table.warnings[0]
+    check(table)
+    assert read(tmp_path, text("t (s);x (cm);quer", body=SEMI)).axes == ("x",)
 
 
 def test_titles_in_several_forms_above_each_other_are_no_names(tmp_path: Path) -> None:
