@@ -11,6 +11,7 @@ from galileo_jax.observation.observation import Observation, PointPath
 HIT_M_S2 = 20.0  # two g
 SHARE = 0.3
 CLEAR = 6.0
+OFF = 4.0  # standard deviations: beside a blow a frame too few costs less than one too many
 USUAL = 4.0
 GOES_ON = 0.1  # of the speed: what keeps less has been stopped
 STEPS = 3  # on either side
@@ -116,7 +117,7 @@ def last_before(path: PointPath, about: int) -> int:
 
 
 def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
-    """Whether the parabola of some places, `own`, goes on to another, by `CLEAR` sd at most.
+    """Whether the parabola of some places, `own`, goes on to another, by `OFF` sd at most.
 
     Without `own` it is that of those before it.
     """
@@ -127,7 +128,7 @@ def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
     fit = polynomial(since, path.place_m[:, own].T, 2)
     scatter = np.sum(fit.left**2, axis=0) / max(len(since) - 3, 1)
     known = np.maximum(scatter, path.variance_m2[last]) * (1 + fit.inverse[2, 2])
-    return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= CLEAR**2 * known))
+    return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= OFF**2 * known))
 
 
 def arrest_frame(observation: Observation) -> int | None:

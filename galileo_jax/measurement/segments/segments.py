@@ -9,7 +9,7 @@ what is no more the object that was marked is `Astray`.
                              the end of the slope, or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
     fall, flight, board      to where the film goes over to slow motion
-    fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
+    fall, flight             from where the hand is off; to a stop or a blow, unless a floor
                              is declared
     toss                     to the first impact
     pendulum, spring, liquid from where it is let go, to a blow or a stop
@@ -207,7 +207,7 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
     if clip.scenario == "toss" and clip.track is not None:
         poses = read_poses_csv(clip.track, clip.track_up)
         ends.append((last_free_frame(poses, clip.objects[0].size_m), LANDED))
-    if is_board or (is_free and clip.scenario == "fall"):
+    if is_board or is_free:
         stop = blow.arrest_frame(observation)
         goes_on = stop is not None and blow.goes_on(observation, stop)
         ends.append((stop, STRUCK if goes_on else STOPPED))
