@@ -320,6 +320,8 @@ def make_fit(
         notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
     if doubts := [doubt for one in measurements for doubt in one.doubts]:
         notes["warnings"] = [*doubts, *notes.get("warnings", [])]
+    if impossible := [one.impossible for one in measurements if one.impossible]:
+        notes["impossible"] = impossible
     result = make_result(
         problem,
         posterior,

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from galileo_jax.clip.look import likely_in_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
@@ -33,6 +34,7 @@ CLEARLY_NEARER = 0.5  # of the way to another explanation
 PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
 LEAST_SHARE = 1 / PIXELS_FROM**2  # of gravity that rough friction leaves in another unit
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
+NEAR_FREE = 1.05  # the same of what nothing brakes: a scale is known to some per cent
 COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
 CHANCE = 1e-3  # that a path is called no parabola though it is one
@@ -62,7 +64,7 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         return None
     if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
         return None
-    likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
+    likely = _likely(clip, factor, found)
     if (unit := _likely_unit(clip, found)) is not None:
         # Gravity goes with the rate's square. What is ten times off fits cm as well as a rate.
         nearest = 2 * min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
@@ -117,6 +119,19 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
     return (
         f"{speeds_up}; a slope of {angle:g} degrees gives {most:.3g} without any friction: check "
         "ramp_angle_deg, the times and the scale, or something pulls it"
+    )
+
+
+def swing_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where what should hang on a thread goes straight down, one way; None elsewhere."""
+    if clip.scenario != "pendulum" or not observation.mask[0].any():
+        return None
+    likely = likely_in_plane(*observation.position_m[0, :2][:, observation.mask[0]])
+    if likely.scenario not in ("incline", "fall") or not likely.is_clear:
+        return None
+    return (
+        f"{clip.path}: {observation.names[0]} goes {likely.why} and does not turn back; what hangs "
+        f"on a thread goes along an arc (perhaps scenario: {likely.scenario})"
     )
 
 
@@ -206,22 +221,28 @@ def _likely_unit(clip: Clip, found: ApparentGravity) -> tuple[str, float] | None
     return f"{words}, or {pixels}" if are_pixels else words, off
 
 
-def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:
-    """The rate that is meant: the container's or a common one, where one is near."""
+def _likely(clip: Clip, factor: float, found: ApparentGravity) -> str:
+    """The rate that is meant: the container's or a common one, where one is near.
+
+    `factor`: of the true rate over the declared one.
+    """
 
     def distance(fps: float) -> float:
-        return abs(math.log(fps / wanted_fps))
+        return abs(math.log(fps / (factor * clip.fps)))
 
     # Friction makes the ramp's acceleration, and with it the true rate, smaller than that.
-    near = math.log(NEAR * 2 if is_most else NEAR)
-    if container_fps and distance(container_fps) < near:
-        return f"likely fps: {container_fps:.4g}, as the container says"
+    near = math.log(NEAR_FREE if found.is_parabola else NEAR * 2 if found.is_least else NEAR)
+    if clip.container_fps and distance(clip.container_fps) < near:
+        return f"likely fps: {clip.container_fps:.4g}, as the container says"
     best = min(COMMON_FPS, key=distance)
-    if is_most:
+    if found.is_least:
         return f"likely fps: {best:g} or less"
     if distance(best) < near:
         return f"likely fps: {best:g}"
-    return "no usual rate explains that: check the unit of length, the axes and what was followed"
+    return (
+        f"no usual rate explains that, lengths {factor**2:.3g} times as long would: check the unit "
+        "of length, the axes and what was followed"
+    )
 
 
 def _largest(accelerations: np.ndarray) -> float | None:

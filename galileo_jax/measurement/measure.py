@@ -21,7 +21,7 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.average_rows import with_rows_averaged
-from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt
+from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt, swing_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import (
@@ -62,6 +62,8 @@ class Measurement:
     segments: Segments = field(default_factory=Segments)  # which part of the track that is, and why
     # of what is declared and of tracks gone astray, one line each; results repeat them
     doubts: tuple[str, ...] = ()
+    # of these, what cannot be by what is declared, without the clip's name
+    impossible: str | None = None
     remarks: tuple[str, ...] = ()  # what was inferred or left out, one line each
     way: OtherWay | None = None  # of object 1, where its path says another than is declared
     # in how many an object is seen and used, and how many the clip has
@@ -168,7 +170,7 @@ def measure(clip: Clip) -> Measurement:
     observation = segments.used(whole)
     doubt = None if segments.astray else frame_rate_doubt(clip, whole)
     if doubt is None and not segments.astray:
-        doubt = speed_doubt(clip, observation)
+        doubt = speed_doubt(clip, observation) or swing_doubt(clip, observation)
     told.say(*map(str, segments.cuts))
     clip = _moving(clip, observation, segments, told)
     if scenario.is_level or clip.scenario == "toss":
@@ -183,8 +185,9 @@ def measure(clip: Clip) -> Measurement:
     doubts += [] if doubt is None else [doubt]
     doubts += [f"{clip.path}: {one}: {one.why}; {overlay}" for one in segments.astray]
     of_scene = _of_scene(clip, tracked, segments, pixels)
+    impossible = doubt and doubt.removeprefix(f"{clip.path}: ")
     return Measurement(
-        clip, observation, whole, pixels, told.inferred, segments, tuple(doubts),
+        clip, observation, whole, pixels, told.inferred, segments, tuple(doubts), impossible,
         tuple(told.remarks), way, frames_used, len(whole.times_s), of_scene,
     )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from math import hypot
 from typing import Any
 
 from galileo_jax.diagnosis.reasons import p_equals
@@ -15,6 +16,7 @@ BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ba
 FRICTION, RATIO = re.compile(r"k(\d+)"), re.compile(r"mass_ratio(?:_(\d+)_(\d+))?")
 MOST_UNSEEN = 3  # effects of which it is said what could not have been seen
 SHARES = {"frame_rate": "a frame rate", "scale_error": "a scale"}  # strength 0.01: 1 % off
+OTHER_SDS = 2.0  # standard deviations of their difference: numbers that are not the same
 SAME_AS_RATIO = "phi"  # says again what the ratio of the masses says
 
 
@@ -49,6 +51,7 @@ def paragraph(
     near, found = ", ".join(nearness(result["error"])), result.get("imperfections")
     is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [
+        *(f"Check first: {one}." for one in result.get("impossible", ())),
         _frictions(known, body, shapes),
         *_ratios(known, body),
         _values(rest),
@@ -57,7 +60,9 @@ def paragraph(
         *(imperfection_text(found, result["error"]) if found else []),
         _verdict(result, check, diagnosis),
         "" if status == "law" else _values(effects),  # the law's text has them
-        f"All values are those with {_all(result)}." if is_in_doubt else "",
+        f"All values are those with {_all(result)}{_otherwise(result, known, diagnosis)}."
+        if is_in_doubt
+        else "",
         _gravity(check),
         unseen_text(check, diagnosis),
     ]
@@ -147,6 +152,32 @@ def _verdict(
         return f"What it leaves looks like noise ({p}), but {lacks} may be missing."
     text = f"What it leaves looks like noise: nothing is missing ({p})."
     return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
+
+
+def _otherwise(
+    result: Mapping[str, Any], known: Mapping[str, Any], diagnosis: Mapping[str, Any] | None
+) -> str:
+    """The friction coefficients with what else explains the data, where they are others."""
+    if diagnosis is None:
+        return ""
+    text, own = "", set(result["effects"])
+    for row in diagnosis["candidates"]:
+        if row["effect"] not in diagnosis["verdict"]["effects"] or own == set(
+            row["effect"].split("+")
+        ):
+            continue
+        others = [
+            f"{name} is {_value(other)}"
+            for name, entry in known.items()
+            if FRICTION.fullmatch(name) and (other := row.get("parameters", {}).get(name))
+            if abs(other["mean"] - entry["mean"]) > OTHER_SDS * hypot(other["sd"], entry["sd"])
+        ]
+        text += (
+            f"; with {_words(row['effect']).replace('+', ' and ')} {listed(others)}"
+            if others
+            else ""
+        )
+    return text
 
 
 def _gravity(check: Mapping[str, Any]) -> str:

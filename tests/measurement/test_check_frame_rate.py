@@ -12,7 +12,11 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.measurement.check_frame_rate import apparent_gravity, frame_rate_doubt
+from galileo_jax.measurement.check_frame_rate import (
+    apparent_gravity,
+    frame_rate_doubt,
+    swing_doubt,
+)
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen as observed_at
@@ -95,8 +99,10 @@ def test_a_measurement_has_it(tmp_path):
     clip, seen = fall(tmp_path)
     clip, seen = off(clip, seen, 10.0)
     write_observation_csv(tmp_path / "fall.csv", seen)
-    (doubt,) = measure(clip).doubts
+    measured = measure(clip)
+    (doubt,) = measured.doubts
     assert doubt == frame_rate_doubt(clip, seen) and "likely fps: 60" in doubt
+    assert doubt == f"{clip.path}: {measured.impossible}"
 
 
 @pytest.mark.parametrize(
@@ -130,6 +136,27 @@ def table(folder: Path, keys: dict, times: np.ndarray, place: np.ndarray) -> tup
     (folder / "a.yaml").write_text(yaml.safe_dump(declared))
     clip = load_clip(folder / "a.yaml")
     return clip, measure(clip).whole
+
+
+def test_what_nothing_brakes_tells_the_rate_to_some_per_cent(tmp_path):
+    """Half as long: a factor of 1.41 in the rate, which no camera has."""
+    times = np.arange(40) / 60
+    throw = np.stack([2 * times, 3 * times - 4.905 * times**2])
+    clip, seen = table(tmp_path, {"scenario": "flight", "track_y": "up"}, times, throw / 2)
+    doubt = frame_rate_doubt(clip, seen)
+    assert (
+        doubt is not None and "lengths 2.02 times as long would" in doubt and "likely" not in doubt
+    )
+
+
+@pytest.mark.parametrize(("slope", "is_said"), [(24.0, True), (0.0, False)])
+def test_a_straight_way_down_is_no_swing(slope, is_said, tmp_path):
+    times = np.arange(40) / 30
+    way = 3.0 * times**2 if is_said else 0.3 * np.cos(4 * times)
+    angle = np.radians(slope)
+    place = np.stack([way * np.cos(angle), 1.0 - way * np.sin(angle) + (0 if is_said else way**2)])
+    clip, seen = table(tmp_path, {"scenario": "pendulum"}, times, place)
+    assert (swing_doubt(clip, seen) is not None) == is_said
 
 
 def test_eleven_coarse_rows_tell_enough(tmp_path):

@@ -174,6 +174,16 @@ def test_of_several_explanations_the_values_are_those_with_one_of_them():
     said = paragraph(known, BAD, found, ["box"])
     assert "All values are those with rolling." in said
     assert "could not have been seen" not in said, "both are in question themselves"
+    for k1, is_said in ((0.11, False), (0.2, True)):
+        found["candidates"] = [{"effect": effects[1], "parameters": {"k1": entry(k1, 0.01)}}]
+        other = "rolling; with table tilt and air drag k1 is 0.200 ± 0.010."
+        assert (other in paragraph(known, BAD, found, ["box"])) == is_said
+
+
+def test_what_cannot_be_by_what_is_declared_is_said_first():
+    doubt = "from ball's path gravity would be 4.9 m/s^2, not 9.81; likely fps: 42"
+    said = paragraph(result(k1=entry(0.1, 0.01)) | {"impossible": [doubt]}, CHECK, None, ["box"])
+    assert said.startswith(f"Check first: {doubt}. The block slid")
 
 
 def test_a_law_has_its_constants_in_its_formula():
