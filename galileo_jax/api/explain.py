@@ -38,6 +38,7 @@ from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 
 UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.45  # shares of the work, for progress
@@ -306,7 +307,12 @@ def answered_clips(
       said: of all of them, by keys of the yaml.
       ask: given what is understood of a clip, and the answers so far, returns all answers.
       look_at: `understood`, or it with a memory or a display of its progress.
+
+    Raises:
+      InputError: there is no such scenario.
     """
+    if (scenario := said.get("scenario")) is not None:
+        check_known("scenario", "scenario", scenario, SCENARIOS)
     found: list[Clip] = []
     asked: list[tuple[Understood, dict[str, Any]]] = []
     answers = dict(said)
