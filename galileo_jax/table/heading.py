@@ -8,7 +8,7 @@ t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
@@ -103,6 +103,28 @@ def split_heading(rows: Rows) -> Heading:
         meanings.append(meaning)
     is_titled = any(one.role for one in meanings)
     return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
+
+
+def one_below_the_other(heading: Heading) -> Heading:
+    """Runs that stand side by side, each with its own times, as motions that follow each other.
+
+    Their columns have the same titles in the same order, but for the data set's name before a
+    colon, and other times, if there is no such name.
+    """
+    plain = [title.rpartition(":")[2].strip() for title in heading.titles]
+    may_be = (n for n in range(2, len(plain) // 2 + 1) if len(plain) % n == 0)
+    width = next((n for n in may_be if plain == plain[:n] * (len(plain) // n)), 0)
+    own = heading.meanings[:width]
+    clock = next((n for n, one in enumerate(own) if one.role == "time"), None)
+    if clock is None or any(one.name for one in heading.meanings):
+        return heading
+    blocks = [slice(n, n + width) for n in range(0, len(plain), width)]
+    each = [[(line, row[part]) for line, row in heading.body if any(row[part])] for part in blocks]
+    times = [[row[clock] for _, row in rows] for rows in each]
+    is_named = len({title.rpartition(":")[0] for title in heading.titles}) == len(blocks)
+    if not is_named and times == times[:1] * len(blocks):
+        return heading
+    return replace(heading, titles=tuple(plain[:width]), meanings=own, body=[*chain(*each)])
 
 
 def _num_titles(row: list[str]) -> int:

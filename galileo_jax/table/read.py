@@ -15,7 +15,7 @@ import numpy as np
 from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.columns import PLACES, Columns, with_roles
 from galileo_jax.table.grid import cells_of
-from galileo_jax.table.heading import split_heading
+from galileo_jax.table.heading import one_below_the_other, split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
     each_place_once,
@@ -62,7 +62,8 @@ def read_table(path: Path, fps: float | None = None) -> TrackTable:
         elif is_trk(content) and not is_spreadsheet(content):
             table = read_trk(content)
         else:
-            table = _table(with_roles(split_heading(cells_of(content)), fps))
+            heading = one_below_the_other(split_heading(cells_of(content)))
+            table = _table(with_roles(heading, fps))
     return replace(table, warnings=tuple(f"{path}: {one}" for one in table.warnings))
 
 

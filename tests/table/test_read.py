@@ -416,6 +416,23 @@ def test_rows_that_were_pasted_again_count_once(again: slice, tmp_path: Path) ->
     assert f"line {at + 2}: {len(body[again])} rows are rows of before" in table.warnings[0]
 
 
+@pytest.mark.parametrize(
+    "heading", ["Run 1: t (s),Run 1: x (m),Run 1: y (m),Latest: t (s),Latest: x (m),Latest: y (m)",
+                "t (s),x (m),y (m),t (s),x (m),y (m)"])  # fmt: skip
+def test_runs_side_by_side_are_motions_one_after_the_other(heading: str, tmp_path: Path) -> None:
+    """The second is shorter; where nobody names them, times that are the same are of one run."""
+    body = [f"{t},{x},{y}," + (f"{t},{2 * x},{y}" if n < 12 else ",,")
+            for n, (t, x, y) in enumerate(truth().T)]  # fmt: skip
+    table = read(tmp_path, text(heading, body=body))
+    assert table.starts == (0, ROWS)
+    check(table.motion(1))
+    np.testing.assert_allclose(table.motion(2).position[0, 0], 2 * truth()[1, :12])
+    same = [f"{t},{x},{y},{t},{2 * x},{y}" for t, x, y in truth().T]
+    if heading.startswith("t"):
+        with pytest.raises(InputError, match="x is given twice"):
+            read(tmp_path, text(heading, body=same))
+
+
 def test_two_motions_that_begin_alike_are_two(tmp_path: Path) -> None:
     other = [row if n < 5 else f"{row.rpartition(',')[0]},0.5" for n, row in enumerate(lines())]
     table = read(tmp_path, text("t,x,y", body=[*lines(), *other]))
