@@ -252,6 +252,37 @@ def test_of_a_throw_the_flight_is_kept_and_the_hand_left_out(
     assert (-0.05 if gently else -0.02) < cut.time_s - rests_s - hand_s < 0.1
 
 
+@pytest.mark.parametrize("shakes_m", [0.0, 3e-3])
+def test_a_ball_falls_from_a_hand_that_shakes_and_into_another(tmp_path, shakes_m) -> None:
+    """A hand that is still is a rest, from which it is let go."""
+    times, let_go_s, caught_s = np.arange(60) / 50, 0.4, 0.95
+    falls = np.clip(times, let_go_s, caught_s) - let_go_s
+    brakes = np.clip((times - caught_s) / 0.09, 0, 1)
+    speed = 9.81 * (caught_s - let_go_s)
+    y = -9.81 / 2 * falls**2 - speed * 0.09 * (brakes - brakes**2 / 2)
+    y += shakes_m * np.sin(9 * times) * (times < let_go_s)
+    place = np.stack([0 * y, 2 + y])
+    cuts = measure(load_clip(table_of(tmp_path, "fall", times, place, noise_m=5e-4))).cuts
+    assert [cut.side for cut in cuts] == ["before", "after"][shakes_m == 0 :]
+    assert 0.92 <= cuts[-1].time_s <= 0.94, "no frame of the catch is left"
+    if shakes_m:
+        assert cuts[0].why == HELD and 0.4 < cuts[0].time_s < 0.5
+
+
+def test_who_catches_a_throw_from_the_first_row_on_ends_it(tmp_path) -> None:
+    """Speeded up by a hand, a flight of .7 s, and stopped within .08 s: no rest tells the usual."""
+    times, place = thrown(60.0, 0.3, lasts_s=0.72)
+    last, velocity = place[:, -1], (place[:, -1] - place[:, -2]) * 60
+    since = np.arange(1, 16) / 60
+    share = np.clip(since / 0.08, 0, 1)
+    caught = last[:, None] + velocity[:, None] * 0.08 * (share - share**2 / 2)
+    place = np.concatenate([place, caught], axis=1)
+    times = np.concatenate([times, times[-1] + since])
+    cuts = measure(load_clip(table_of(tmp_path, "flight", times, place, noise_m=1e-3))).cuts
+    assert [cut.side for cut in cuts] == ["before", "after"]
+    assert 0.28 < cuts[0].time_s < 0.4 and 0.95 < cuts[1].time_s < 1.03
+
+
 def test_a_push_on_a_board_too_rough_to_slide_is_left_out(tmp_path) -> None:
     times, off_s, push, slows = np.arange(90) / 60, 0.2, 6.0, 1.6
     pushed, free = np.clip(times, 0, off_s), np.clip(times - off_s, 0, push * off_s / slows)

@@ -116,8 +116,8 @@ def last_before(path: PointPath, about: int) -> int:
     return last
 
 
-def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
-    """Whether the parabola of some places, `own`, goes on to another, by `OFF` sd at most.
+def continues(path: PointPath, last: int, own: slice | None = None, most_sds: float = OFF) -> bool:
+    """Whether the parabola of some places, `own`, goes on to another, by `most_sds` at most.
 
     Without `own` it is that of those before it.
     """
@@ -128,7 +128,7 @@ def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
     fit = polynomial(since, path.place_m[:, own].T, 2)
     scatter = np.sum(fit.left**2, axis=0) / max(len(since) - 3, 1)
     known = np.maximum(scatter, path.variance_m2[last]) * (1 + fit.inverse[2, 2])
-    return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= OFF**2 * known))
+    return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= most_sds**2 * known))
 
 
 def arrest_frame(observation: Observation) -> int | None:
@@ -148,7 +148,7 @@ def arrest_frame(observation: Observation) -> int | None:
     for i in range(BEFORE + 1, len(step_s)):
         own = slice(i - 1 - BEFORE, i - 1)
         way = velocity[:, own].sum(axis=1)
-        going = way @ velocity / max(float(np.hypot(*way)), np.finfo(float).tiny)
+        going = way @ velocity / max(float(np.linalg.norm(way)), np.finfo(float).tiny)
         usual = np.median(going[own])
         is_clear = usual > STOP_CLEAR * np.median(speed_sd[own])
         is_smeared = going[i - 1] <= STEADY * usual

@@ -18,6 +18,7 @@ exactly the parabola of what follows tells, back to the first frame that it does
 import numpy as np
 
 from galileo_jax.measurement.segments.blow import SMEARED, continues
+from galileo_jax.measurement.segments.rest import is_one_place
 from galileo_jax.numerics.least_squares import least_squares, polynomial
 from galileo_jax.observation.observation import Observation, PointPath
 
@@ -27,6 +28,7 @@ WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
 PUSHED_WAY = 0.5  # of the way on a level table
 LATER = 0.4  # of the windows of what falls or flies: the others tell what is usual
 FREE_FRAMES = 20  # on either side of a jump, that tell the acceleration
+MEETS = 6.0  # standard deviations: a parabola meets a place from which drag bends the path
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
 
 
@@ -114,10 +116,26 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
     first = held + size if held >= 0 else 0
     free = slice(first, min(first + 4 * max(FEWEST, size), len(path)))
     # A drag that changes on the way leads on to what was before it, and a hand that lets go gently.
-    while first > 0 and continues(path, first - 1, free if is_carried else slice(first, free.stop)):
+    own = free if is_carried else None
+    while first > 0 and continues(path, first - 1, own or slice(first, free.stop), MEETS):
         first -= 1
     # Within a step of its end a hand's push does not show.
     return int(path.frames[first + 1]) if first else None
+
+
+def shaken_frame(observation: Observation) -> int | None:
+    """The first frame in which object 1 falls by itself from a hand that was not still.
+
+    None where it was still, or nothing held it: the mean places of the thirds of the time before
+    agree, as those of a rest do.
+    """
+    path = observation.path()
+    gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
+    free = _leaves(path, gone, float(gone.max(initial=0.0)))
+    held = path[: max(free - SMEARED, 0)]
+    if len(held) < FEWEST or free + 1 >= len(path):
+        return None
+    return None if is_one_place(held, float(gone.max())) else int(path.frames[free + 1])
 
 
 def comes_free(observation: Observation, last: int) -> bool:

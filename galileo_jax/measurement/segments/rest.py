@@ -1,6 +1,7 @@
 """Rests: between which of them the run is that is meant, and after which nothing moves any more."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -63,6 +64,20 @@ def runs_between(rests: Sequence[slice], count: int) -> list[tuple[int, int]]:
     return list(zip(ends[::2], ends[1::2], strict=True))
 
 
+def is_one_place(held: PointPath, way_m: float) -> bool:
+    """Whether a part of a path is a rest, as `_is_still` tells one, beside the whole way."""
+    third = len(held) // 3
+    most = _most_apart(way_m, held, third)
+    means = [held.place_m[:, k * third : (k + 1) * third].mean(axis=1) for k in range(3)]
+    return all(float(np.linalg.norm(a - b)) < most for a, b in combinations(means, 2))
+
+
+def _most_apart(way_m: float, path: PointPath, third: int) -> float:
+    """How far from each other the mean places of the thirds of a rest may be, m."""
+    noise_m = CLEAR * np.sqrt(2 * float(np.median(path.variance_m2)) / third)
+    return max(STILL * way_m, noise_m)
+
+
 def _is_still(path: PointPath) -> np.ndarray:
     """Which of the places lie in a window at rest, `[place]`.
 
@@ -76,7 +91,7 @@ def _is_still(path: PointPath) -> np.ndarray:
     if len(path) < max(FEWEST, size):
         return covered
     extent = float(np.hypot(*np.ptp(place, axis=1)))
-    most = max(STILL * extent, CLEAR * np.sqrt(2 * float(np.median(path.variance_m2)) / third))
+    most = _most_apart(extent, path, third)
     means = np.lib.stride_tricks.sliding_window_view(place, third, axis=1).mean(axis=-1)
     count = len(path) - 3 * third + 1
     parts = [means[:, k * third : k * third + count] for k in range(3)]

@@ -168,7 +168,10 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
-        return kept.cut("before", handling.thrown_frame(kept.observation, rest_belongs), HELD)
+        free = handling.thrown_frame(kept.observation, rest_belongs)
+        if free is None and rest_belongs:
+            free = handling.shaken_frame(kept.observation)
+        return kept.cut("before", free, HELD)
     is_hand_asked = is_let_go and scenario.angle_deg != 0 and pushed is None
     return (
         kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_hand_asked else kept
