@@ -17,7 +17,7 @@ from galileo_jax.diagnosis.friction_along_way import Stretch, friction_along_way
 from galileo_jax.diagnosis.judge import Judge
 from galileo_jax.diagnosis.law_verdict import joined_names, law_verdict
 from galileo_jax.diagnosis.stakes import num_expected, odds_of
-from galileo_jax.diagnosis.thresholds import CONVINCING
+from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.diagnosis.verdict import explains, ranked, without_a_name
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.joint_problem import JointProblem
@@ -26,7 +26,8 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.imperfect import with_imperfections
 from galileo_jax.statespace.terms import ROUGHNESS
 
-# Beside none: so many of the most probable of each kind in the exact world.
+# Beside none: so many of the most probable of each kind in the exact world, and pairs that contest
+# the best of them.
 NUM_SINGLE, NUM_FORMS, NUM_PAIRS, NUM_LAWS = 6, 2, 2, 2
 
 
@@ -117,7 +118,12 @@ def _best(candidates: Sequence[Candidate]) -> list[Candidate]:
     named = [c for c in candidates if c.law is None and not c.is_form]
     pairs = [c for c in named if len(c.effects) > 1]
     single = [c for c in named if len(c.effects) == 1]
-    return [*laws[:NUM_LAWS], *forms[:NUM_FORMS], *pairs[:NUM_PAIRS], *single[:NUM_SINGLE]]
+    near = [c for i, c in enumerate(pairs) if i < NUM_PAIRS or _contests(c, pairs[0])]
+    return [*laws[:NUM_LAWS], *forms[:NUM_FORMS], *near, *single[:NUM_SINGLE]]
+
+
+def _contests(candidate: Candidate, best: Candidate) -> bool:
+    return best.log_odds - candidate.log_odds < DECISIVE
 
 
 def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Candidate | None:
