@@ -13,6 +13,7 @@ from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
 STRAIGHT = 0.03  # of a path's length: what stays within this of a line is straight
 LEVEL_DEG, STEEP_DEG = 2.0, 60.0
+SETS_OUT = 0.05  # of the longest way of all bodies: who is so far away has set out
 """Between these a straight way is a slope; a steeper one may be a table seen from above."""
 
 SWINGS = 3  # turns back of a motion that swings
@@ -257,12 +258,23 @@ def proposed_yaml(
         lines.append(f"# ramp_angle_deg: measured, in degrees{seen}")
     shape = usual_shape(scenario)
     lines.append("objects:")
-    for name in table.names:
+    for name in _by_onset(table):
         plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in name).strip("_")
         plain = plain if plain[:1].isalpha() else f"object{table.names.index(name) + 1}"
         track_name = f", track_name: '{name}'" if len(table.names) > 1 else ""
         lines.append(f"  - {{name: {plain}, shape: {shape}{track_name}}}")
     return "\n".join(lines) + "\n"
+
+
+def _by_onset(table: TrackTable) -> list[str]:
+    """The names of its bodies, those first that set out first; last those that never do."""
+    begins = np.where(np.isfinite(table.position), table.position, np.inf)
+    seen = np.isfinite(begins).all(axis=1).argmax(axis=1)
+    first = np.take_along_axis(table.position, seen[:, None, None], axis=-1)
+    gone = np.nan_to_num(np.linalg.norm(table.position - first, axis=1))
+    away = gone > SETS_OUT * gone.max()
+    onset = np.where(away.any(axis=1), away.argmax(axis=1), away.shape[1])
+    return [table.names[i] for i in np.argsort(onset, kind="stable")]
 
 
 def usual_shape(scenario: str) -> str:

@@ -285,6 +285,7 @@ def _placed(
 
 
 OURS = re.compile(r"time_s|\w+_[xy]_m", re.IGNORECASE)
+OUR_BODY = re.compile(r"object\d+(_\w+)?|\w+_[xyz]_m|[xyz]_m", re.IGNORECASE)
 
 
 def _is_ours(path: Path) -> bool:
@@ -298,7 +299,8 @@ def _is_ours(path: Path) -> bool:
             return False
         titles = [title.lower() for title in read_cells(path)[0][1]]
     sides = {axis for axis in "xy" for one in titles if f"_{one}".endswith(f"_{axis}_m")}
-    return len(sides) != 1 and any(OURS.fullmatch(title) for title in titles)
+    is_meant = all(any(map(one.fullmatch, titles)) for one in (OURS, OUR_BODY))
+    return len(sides) != 1 and is_meant
 
 
 def _times(of: DeclaredTrack, table: TrackTable) -> np.ndarray:

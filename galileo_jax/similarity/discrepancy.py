@@ -48,6 +48,8 @@ def offsets(observation: Observation) -> list[np.ndarray]:
     """The modes of a track as a whole: with these alone, displacements are what counts."""
     place, found = observation.position_m, []
     for i, axis in np.ndindex(place.shape[:2]):
+        if not observation.mask[i].any():  # in a first part of a clip
+            continue
         # Paths begin where the object is first seen, within that frame's error.
         seen = int(np.argmax(observation.mask[i]))
         error = observation.covariance_m2[i, axis, axis, seen]

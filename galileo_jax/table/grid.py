@@ -103,7 +103,7 @@ def _cells(line: str, separator: str) -> list[str]:
     if separator == ", ":
         return [cell.strip().strip('"').strip() for cell in re.split(r",\s+", line.strip())]
     if separator == " ":
-        return line.split()
+        return [cell.strip('"') for cell in line.split()]
     try:
         row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     except csv.Error:

@@ -72,13 +72,19 @@ def split_heading(rows: Rows) -> Heading:
         counts += [len(row) for _, row in above[start:]]
     at = max(range(len(counts)), key=lambda n: (counts[n], n), default=-1)
     if at < 0 or not counts[at]:
-        # Titles in words that are not known are the last row that fills the columns.
-        at = max((n for n, (_, row) in enumerate(above) if sum(map(bool, row)) >= min(width, 2)
-                  and not _is_units(row)), default=-1)  # fmt: skip
-    cut = next((n for n in range(at + 1, len(above)) if at >= 0 and _has_number(above[n][1])), None)
+        # Titles in words that are not known are the last row that fills the columns; a comment
+        # is none unless it has a cell for each.
+        filled = max(len(row) for _, row in body)
+        at = max((n for n, (line, row) in enumerate(above) if sum(map(bool, row)) >= min(width, 2)
+                  and not (_is_units(row) or _has_number(row))
+                  and (line not in commented or len(row) == filled)), default=-1)  # fmt: skip
+    below = (n for n in range(at + 1, len(above)) if above[n][0] not in commented)
+    cut = next((n for n in below if at >= 0 and _has_number(above[n][1])), None)
     if cut is not None:  # a bad cell in the first row of numbers
         above, body = above[:cut], [*rows[cut:start], *body]
     titles = (above[at][1] if at >= 0 else []) + [""] * width
+    if at >= 0 and _has_row_names(above[at][1], body):
+        titles = ["", *titles]
     body = [(line, row) for line, row in body if at < 0 or row != above[at][1]]
     titles = _with_clock_above(titles, [row for _, row in above[: max(at, 0)]])
     if at >= 0:
@@ -125,6 +131,16 @@ def one_below_the_other(heading: Heading) -> Heading:
     if not is_named and times == times[:1] * len(blocks):
         return heading
     return replace(heading, titles=tuple(plain[:width]), meanings=own, body=[*chain(*each)])
+
+
+def _has_row_names(titles: list[str], body: Rows) -> bool:
+    """Whether each row has one cell more than there are titles, the first of which is its name.
+
+    As R's write.table numbers them, from 1 on.
+    """
+    names = [row[0] for _, row in body]
+    is_longer = all(titles) and all(len(row) == len(titles) + 1 for _, row in body)
+    return is_longer and names == [str(n) for n in range(1, len(body) + 1)]
 
 
 def _num_titles(row: list[str]) -> int:

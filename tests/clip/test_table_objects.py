@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.look import seen_in_table
 from galileo_jax.measurement.measure import observed
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.read import read_table
 
 T = np.arange(30) / 60
 PLACES = (np.array([0.8 * T, 0.1 - 0.3 * T]), np.array([1.0 - 0.2 * T, 0.1 + 0.2 * T]))
@@ -89,3 +91,23 @@ def test_one_time_that_is_wrong_is_no_second_motion(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match=r"row 13.* is not after"):
         load_clip(tmp_path / "a.yaml")
+
+
+def test_who_sets_out_first_is_proposed_first(tmp_path: Path) -> None:
+    rows = [f"{t},{name},{x:.5f},{y:.5f}"
+            for t in T
+            for name, x, y in (("rests", 1 + max(t - 0.2, 0.0), 0.02),
+                               ("slides", 0.9 * t * t, 0.4 - 0.3 * t * t))]  # fmt: skip
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t (s),id,x (m),y (m)", *rows]) + "\n")
+    proposed = seen_in_table(path, read_table(path)).yaml
+    assert proposed.index("name: slides") < proposed.index("name: rests")
+
+
+def test_a_clock_alone_makes_no_csv_of_ours(tmp_path: Path) -> None:
+    rows = [f"{t},{800 * t * t:.3f},{-300 * t * t:.3f}" for t in T]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,x_mm,y_mm", *rows]) + "\n")
+    (tmp_path / "a.yaml").write_text(
+        "track: a.csv\nscenario: incline\nramp_angle_deg: 20\nobjects: [{name: a, shape: box}]\n"
+    )
+    assert load_clip(tmp_path / "a.yaml").track_units == "mm"

@@ -74,6 +74,16 @@ def test_wobble_is_across_the_path_and_of_its_size(hit):
     assert abs(far) < 0.05 * WOBBLE_SD_M**2
 
 
+def test_what_is_not_seen_in_a_part_of_a_clip_has_no_patterns(hit):
+    """Before object 2 of a film comes into sight."""
+    mask = hit.mask.copy()
+    mask[1] = False
+    hidden = np.where(mask[:, None, None], hit.covariance_m2, np.nan)
+    place = np.where(mask[:, None], hit.position_m, np.nan)
+    found = modes(replace(hit, mask=mask, position_m=place, covariance_m2=hidden), SCENE)
+    assert np.isfinite(found[..., mask[0]]).all()
+
+
 def test_what_is_not_smooth_across_the_path_does_not_tell_the_noise(hit):
     """To and fro every frame: beside what is allowed for, noise of half a millimetre is nothing."""
     _, across = along_and_across(hit)

@@ -312,6 +312,28 @@ def test_words_tell_the_bodies_of_a_row_for_each_apart(tmp_path: Path) -> None:
     check(read(tmp_path, text("t (s);what;x (m);y (m)", body=remarks)))
 
 
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_rows_that_have_numbers_without_a_title(quote: str, tmp_path: Path) -> None:
+    """As R's write.table writes them."""
+    body = [f"{quote}{n + 1}{quote} {row}" for n, row in enumerate(lines(" "))]
+    titles = " ".join(f"{quote}{one}{quote}" for one in ("time", "x.mm", "y.mm"))
+    table = read(tmp_path, text(titles, body=body), "txt")
+    assert table.unit == "mm"
+    check(table)
+
+
+def test_comments_with_a_word_and_its_value_are_no_titles(tmp_path: Path) -> None:
+    """As Octave saves a matrix."""
+    heading = (
+        "# Created by Octave 8.4.0",
+        "# name: a",
+        "# type: matrix",
+        "# rows: 21",
+        "# columns: 3",
+    )
+    check(read(tmp_path, text(*heading, body=lines(" ")), "txt"))
+
+
 def test_a_name_above_one_column_is_that_of_all(tmp_path: Path) -> None:
     table = read(tmp_path, text(",,block", "t in s,x in m,y in m"))
     assert table.names == ("block",)
