@@ -19,6 +19,7 @@ from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.diagnosis.could_not_see import unseen
 from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.diagnosis.stakes import VerdictStakes
+from galileo_jax.diagnosis.thresholds import CONVINCING
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
 from galileo_jax.observation.digest import digest
 from galileo_jax.report.diagnosis_charts import comparison_chart
@@ -86,6 +87,14 @@ class Comparison:
         up in their place; `diagnose` fits them.
         """
         return tuple(self.document.get("in_question", ()))
+
+    @property
+    def rests_on_imperfections(self) -> bool:
+        """Whether the model is adequate only where imperfections are allowed for.
+
+        In an exact world it is e^7 times less probable: an effect may explain the motion better.
+        """
+        return self.document.get("rests_on_imperfections", False)
 
     @property
     def cells(self) -> "pd.DataFrame":
@@ -262,4 +271,6 @@ def _unseen(fit: Fit, gradient: GradientFit, found: Compared, seed: int) -> dict
         alone = Hypothesis(fit.effects, fit_among(fit.exact, fit.problem, exact), exact)
     log_priors = VerdictStakes(sized, is_adequate=True).log_priors_beside(last)
     left = unseen(sized, last, log_priors, seed, alone)
-    return {key: value for key, value in asdict(left).items() if value}
+    told = {key: value for key, value in asdict(left).items() if value}
+    behind = 0.0 if alone is None else gradient.log_evidence - alone.fit.log_evidence
+    return told | ({"rests_on_imperfections": True} if behind >= CONVINCING else {})

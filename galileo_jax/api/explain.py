@@ -346,7 +346,7 @@ def explained(
     if check.found.no_verdict is not None:
         return found
     with progress.part(COMPARED, 0.95):
-        if check.is_adequate and not check.in_question:
+        if check.is_adequate and not (check.in_question or check.rests_on_imperfections):
             return replace(found, gravity=_gravity(first, engine, seed))
         if out is not None:
             found.save(out)

@@ -26,8 +26,7 @@ with r the residuals, of which noise alone would leave r^2 = n, and `along` thei
 is in question where the mean over its shapes is what the verdict asks for. A size that is fitted
 without the effect is too large beside it, and may hide it: so an effect is in question, too, if by
 its slopes it is so much more probable in an exact world than none is in this one, and no other
-effect is far ahead of it there. A slope tells a large effect badly: one that explains `MOST` of the
-squares may explain all, and is in question where that would be enough.
+effect is far ahead of it there.
 """
 
 from collections.abc import Mapping
@@ -57,7 +56,6 @@ from galileo_jax.search.score_tests import (
 ROUNDS = 3  # of slopes: each at the strength that the one before gave
 RATE_Z = 1e-3  # of a strength's prior: a difference over it is a derivative
 USUAL_Z = 1.0  # as large as effects usually are, in a strength's prior
-MOST = 0.5  # of the squares that a fit leaves
 PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their prior
 
 
@@ -106,14 +104,11 @@ def unseen(
     needed = _needed_beside(last.fit)
     in_question = {name for name, one in beside.items() if one.log_odds() >= needed}
     if exact is not None and last.fit.sizes is not None:
-        behind, own = last.fit.log_evidence - exact.fit.log_evidence, exact.of(trials)
-        alone = [_Beside.of(own, exact, name, log_priors[name], seed) for name in asked]
+        behind = last.fit.log_evidence - exact.fit.log_evidence
+        alone = (_Beside.of(exact.of(trials), exact, n, log_priors[n], seed) for n in asked)
         odds = {one.effect: one.log_odds() - behind for one in alone}
         least = max(needed, max(odds.values(), default=0.0) - DECISIVE)
-        in_question |= {name for name, found in odds.items() if found >= least}
-        most = _gain_to_noise(own, exact.fit) - behind
-        may = (one for one in alone if one.share >= MOST and most + one.log_prior >= needed)
-        in_question |= {one.effect for one in may}
+        in_question |= {name for name, own in odds.items() if own >= least}
     each = [one.entry() for one in beside.values()]
     changes = changed_numbers(own, last.fit, np.array([p for _, p in each])) if each else []
     entries = {
@@ -126,16 +121,6 @@ def unseen(
 def _needed_beside(fit: GradientFit) -> float:
     """The log odds that an effect needs beside a fit that describes the clips."""
     return CONVINCING if fit.sizes is None else DECISIVE
-
-
-def _gain_to_noise(trials: JointProblem, fit: GradientFit) -> float:
-    """The log evidence that is gained where nothing but the stated noise is left, nats.
-
-    Of n values that were taken for s times as much noise as stated n log s.
-    """
-    scales = trials.theta(fit.z, fit.free)[len(trials.model_parameters) :]
-    numbers = [problem.data.num_values for problem in trials.problems]
-    return float(np.log(np.maximum(scales, 1.0)) @ numbers)
 
 
 def _num_left(fit: GradientFit) -> float:
@@ -193,16 +178,6 @@ class _Beside:
     def _strength(self) -> Parameter:
         return self.trials.model_parameters[self._where[0]]
 
-    @cached_property
-    def _left(self) -> float:
-        """The squares that the fit leaves, of which noise alone would leave one a residual."""
-        return max(_num_left(self.fit), misfit(self.trials, self.fit))
-
-    @property
-    def share(self) -> float:
-        """Of these, what it explains by the slope to it: the mean over its shapes."""
-        return float(explained(self.along, self.power).mean()) / self._left
-
     def log_odds(self) -> float:
         """At its best strength, by the slopes: the mean over its shapes."""
         own = self._strength
@@ -213,7 +188,8 @@ class _Beside:
         z = np.where(is_one, z, 0.0)
         wide = (in_units(own.prior, z + RATE_Z) - in_units(own.prior, z - RATE_Z)) / (2 * RATE_Z)
         num_left = _num_left(self.fit)
-        share = np.minimum(explained(self.along, self.power) / self._left, 1 - 1e-9)
+        left = max(num_left, misfit(self.trials, self.fit))
+        share = np.minimum(explained(self.along, self.power) / left, 1 - 1e-9)
         odds = -0.5 * num_left * np.log1p(-share) - 0.5 * z**2
         odds -= 0.5 * np.log1p(self.power * (wide / step) ** 2)
         mean = float(logsumexp(np.where(is_one, odds, -np.inf)) - np.log(len(odds)))

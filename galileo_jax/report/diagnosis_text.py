@@ -43,6 +43,8 @@ def adequacy(record: Mapping[str, Any]) -> str:
     text = f"The model {model}is adequate: its residuals look like noise ({equals})"
     if asked := record.get("in_question"):
         return f"{text}, but {listed(asked, 'or')} may be missing: galileo diagnose tells."
+    if record.get("rests_on_imperfections"):
+        return f"{text}, beside imperfections; an effect may be better: galileo diagnose tells."
     text = f"{text}."
     return f"{text} {noise_text(record['noise_scale'])}" if record["noise_misstated"] else text
 

@@ -150,6 +150,10 @@ def _verdict(
     if asked := check.get("in_question"):
         lacks = listed([_words(name) for name in asked], "or")
         return f"What it leaves looks like noise ({p}), but {lacks} may be missing."
+    if check.get("rests_on_imperfections"):
+        return (
+            f"What it leaves looks like noise ({p}), beside imperfections; an effect may be better."
+        )
     text = f"What it leaves looks like noise: nothing is missing ({p})."
     return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
 

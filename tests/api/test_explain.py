@@ -172,6 +172,19 @@ def thrown(path: Path, drag_per_m: float) -> Path:
     return path
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_a_model_that_rests_on_imperfections_says_so(friction, tmp_path):
+    """Pushes between two bodies that part after a hit stand for other friction on the table."""
+    hidden = {"surface_friction": {"surface_friction": friction}} if friction else ()
+    made = tmp_path / "a.csv"
+    gx.simulate(made, scenario="ramp", seed=5, track_only=True, effects=hidden)
+    check = gx.compare(gx.fit(made))
+    assert check.is_adequate
+    assert check.rests_on_imperfections == bool(friction)
+    is_said = "beside imperfections" in adequacy(check.document)
+    assert is_said == (check.rests_on_imperfections and not check.in_question)
+
+
 @pytest.mark.parametrize("drag", [0.0, 0.15])
 def test_what_imperfections_take_up_is_asked_for(drag, tmp_path):
     """The size of gusts is free: a throw with drag is one with strong gusts, too, and no worse."""

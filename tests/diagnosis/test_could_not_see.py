@@ -21,7 +21,6 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.model.parameters import LogNormal, Normal, Uniform
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.search.imperfect import with_imperfections
 from tests.found import candidate_of, comparison_of
 
 EFFECTS = ("air_drag", "rolling", "ramp_angle")
@@ -129,19 +128,3 @@ def test_an_effect_that_would_show_is_in_question_where_it_was_hidden(tmp_path):
         base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
         found = unseen(trials, base, dict.fromkeys(EFFECTS, -3.0), 0).in_question
         assert found[:1] == expected
-
-
-def test_a_large_effect_is_in_question_beside_imperfections_though_its_slope_tells_it_badly(
-    tmp_path,
-):
-    """The hit comes at another time with it: an exact fit without it is far from the motion."""
-    hidden = {"surface_friction": {"surface_friction": -0.1}}
-    simulate(tmp_path / "a.csv", scenario="ramp", seed=5, track_only=True, effects=hidden)
-    seen = measure(load(tmp_path / "a.csv"))
-    library = ("surface_friction", "constant_force")
-    trials = with_library([seen.clip], [seen.observation], "rigid", library)
-    exact = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()), trials)
-    world = with_imperfections(trials, exact.fit, to_rest=False)
-    last = Hypothesis((), world.fit, world.trials)
-    found = unseen(world.trials, last, dict.fromkeys(library, -3.0), 0, exact)
-    assert found.in_question == ("surface_friction",)
