@@ -169,8 +169,7 @@ def along_line(
     with named(of.path):
         told = [told_noise_m(name, times, w) for name, w in zip(of.names, way_m, strict=True)]
     sd_m = np.maximum(told, rounding_m / math.sqrt(12))[:, None] + np.zeros(len(times))
-    is_upright = scenario.line == "down" and axis in ("y", "z")
-    if is_upright and file.track_y is not None:
+    if scenario.line == "down" and file.track_y is not None:
         sign = 1 if file.track_y == "up" else -1
     else:
         sign = sign_along(file, times, way_m[0])
@@ -190,9 +189,12 @@ def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
     seen = np.isfinite(way)
     scenario = SCENARIOS[file.scenario]
     if scenario.line == "down":
-        is_falling = scenario.up_shows == "bend"
-        sign = -_sign(accelerations(times[seen], way[seen])) if is_falling else 1
-        return sign or 1
+        if scenario.up_shows != "bend":
+            return 1
+        # Between bounces it falls in most rows, though not in most parabolas.
+        has_floor = file.floor is not None and file.floor is not False
+        falls = np.diff(way[seen], 2) if has_floor else accelerations(times[seen], way[seen])
+        return -_sign(falls) or 1
     gone = way[seen] - way[seen][0]
     has_turned = abs(gone[-1]) < 0.5 * np.abs(gone).max()
     return (_sign(accelerations(times[seen], gone)) if has_turned else int(np.sign(gone[-1]))) or 1

@@ -36,6 +36,22 @@ def test_a_fall_by_its_height_or_depth(sign: int, tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.abs(found.across[0, 0]), 1.0)
 
 
+@pytest.mark.parametrize("declared", ["", "\ntrack_y: down"])
+def test_a_sensor_above_measures_downwards_also_what_bounces(declared: str, tmp_path: Path) -> None:
+    times = np.arange(150) / 50
+    height, speed, place = 1.2, 0.0, []
+    for _ in times:
+        place.append(height)
+        for _ in range(20):
+            height, speed = height + 1e-3 * speed, speed - 9.81e-3
+            if height < 0 and speed < 0:
+                height, speed = -height, -0.8 * speed
+    away = 1.5 - np.array(place) + np.random.default_rng(2).normal(0, 5e-4, 150)
+    keys = f"scenario: fall\nfloor: true{declared}"
+    found = observed(tmp_path, {"Time (s)": times, "Position (m)": away}, keys)
+    assert np.corrcoef(found.position_m[0, 1], place)[0, 1] > 0.99
+
+
 @pytest.mark.parametrize("columns", [
     {"t (s)": T, "x (m)": WAY},
     {"t (s)": T, "x (m)": -WAY},

@@ -15,7 +15,7 @@ from galileo_jax.measurement.segments.handling import (
     thrown_frame,
 )
 from galileo_jax.measurement.segments.rest import standstill_frame
-from galileo_jax.measurement.segments.segments import HELD, PUSHED
+from galileo_jax.measurement.segments.segments import HELD, PLACED, PUSHED
 from galileo_jax.measurement.segments.start_speed import let_go_frame
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen
@@ -267,6 +267,16 @@ def test_a_ball_falls_from_a_hand_that_shakes_and_into_another(tmp_path, shakes_
     assert 0.92 <= cuts[-1].time_s <= 0.94, "no frame of the catch is left"
     if shakes_m:
         assert cuts[0].why == HELD and 0.4 < cuts[0].time_s < 0.5
+
+
+def test_who_lifts_a_ball_before_it_falls_is_left_out(tmp_path) -> None:
+    times = np.arange(120) / 60
+    lifted = 0.3 * np.clip(times / 0.5, 0, 1)
+    falls = np.clip(times - 0.85, 0, np.sqrt(2 / 9.81))
+    place = np.stack([0 * times, 1 + lifted - 9.81 / 2 * falls**2])
+    before, after = measure(load_clip(table_of(tmp_path, "fall", times, place))).cuts
+    assert before.why == PLACED and 0.5 < before.time_s < 0.85
+    assert after.time_s == pytest.approx(0.85 + np.sqrt(2 / 9.81), abs=0.03)
 
 
 def test_who_catches_a_throw_from_the_first_row_on_ends_it(tmp_path) -> None:

@@ -9,8 +9,8 @@ what is no more the object that was marked is `Astray`.
                              the end of the slope, or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
     fall, flight, board      to where the film goes over to slow motion
-    fall, flight             from where the hand is off; to a stop or a blow, unless a floor
-                             is declared
+    fall, flight             from where the hand is off, of a fall from the rest after which it
+                             comes down; to a stop or a blow, unless a floor is declared
     toss                     to the first impact
     pendulum, spring, liquid from where it is let go, to a blow or a stop
     ramp                     to where a box tips over, two that touch turn aside, or object 1 comes
@@ -149,7 +149,8 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     is_let_go = (
         scenario.has_ramp and not clip.starts_moving and "start_velocity" not in scenario.laws
     )
-    if is_let_go:
+    is_dropped = is_free and clip.scenario == "fall" and not clip.objects[0].first_frame
+    if is_let_go or is_dropped:
         first, last = rest.placed_frames(kept.observation)
         kept = kept.cut("before", first, PLACED).cut("after", last, TAKEN)
     if clip.scenario in SWINGS:
