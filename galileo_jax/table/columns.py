@@ -58,7 +58,7 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     has_clock = any(one.role in ("time", "frame") for one in meanings)
     has_place = any(one.role in PLACES for one in meanings)
     asked = [n for n, one in enumerate(meanings)
-             if (one.role and (one.role != "object" or _may_be_used(heading, n)))
+             if (one.role and not (one.role in ("object", "frame") and _are_words(heading, n)))
              or (n in left and not (has_clock and has_place))]  # fmt: skip
     # Whatever it is called, a column of dates or of clocks is the time where no other is.
     tried = (
@@ -90,6 +90,12 @@ def _may_be_used(heading: Heading, n: int) -> bool:
         return False
     cells = [row[n] for _, row in heading.body[:200] if n < len(row) and row[n]]
     return bool(cells) and all(is_number(cell) or is_nothing(cell) for cell in cells)
+
+
+def _are_words(heading: Heading, n: int) -> bool:
+    """Whether a column has words alone, as names of bodies, or of files."""
+    cells = [row[n] for _, row in heading.body[:200] if n < len(row) and row[n]]
+    return bool(cells) and not any(is_number(cell) or is_nothing(cell) for cell in cells)
 
 
 def _is_even(numbers: Numbers) -> bool:

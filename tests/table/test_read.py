@@ -334,6 +334,23 @@ def test_comments_with_a_word_and_its_value_are_no_titles(tmp_path: Path) -> Non
     check(read(tmp_path, text(*heading, body=lines(" ")), "txt"))
 
 
+def test_how_a_body_is_turned_is_no_place(tmp_path: Path) -> None:
+    """As robots record it."""
+    pose = [f"field.pose.{one}" for one in ("position.x", "position.y", "orientation.x")]
+    body = [f"{1718100000000000000 + round(1e9 * t)},{x},{y},0.1" for t, x, y in truth().T]
+    table = read(tmp_path, text(",".join(["%time", *pose]), body=body))
+    assert len(table.names) == 1 and table.axes == ("x", "y")
+    np.testing.assert_allclose(table.clock - table.clock[0], truth()[0], atol=1e-6)
+    np.testing.assert_allclose(table.position[0], truth()[1:])
+
+
+def test_names_of_pictures_are_no_numbers_of_theirs(tmp_path: Path) -> None:
+    body = [f"{n}.jpg,{x},{y}" for n, (_, x, y) in enumerate(truth().T)]
+    table = read(tmp_path, text("image_id,a.x,a.y", body=body))
+    assert table.is_counted
+    np.testing.assert_allclose(table.position[0], truth()[1:])
+
+
 def test_a_name_above_one_column_is_that_of_all(tmp_path: Path) -> None:
     table = read(tmp_path, text(",,block", "t in s,x in m,y in m"))
     assert table.names == ("block",)
