@@ -38,6 +38,7 @@ NEAR_FREE = 1.05  # the same of what nothing brakes: a scale is known to some pe
 COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
 CHANCE = 1e-3  # that a path is called no parabola though it is one
+LEVELS_OFF = 4.0  # times what it falls faster by in the end: a drag has made it so little
 SINE = 0.3  # of its scatter is what a sine leaves of a swing at most
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
@@ -172,6 +173,11 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
     if (value := _largest(windows)) is not None:
         scatter = 1.4826 * float(np.median(np.abs(windows - value)))
         found = ApparentGravity(value, sd=scatter / math.sqrt(len(windows) / 2))
+        after = windows[int(np.argmax(windows)) :]
+        if after[0] > LEVELS_OFF * after[-1] and after.min() > -after[0] / LEVELS_OFF:
+            found = ApparentGravity(
+                float(after[0]), is_least=True
+            )  # the air stops it falling faster
     if size < 1 or np.ptp(height) == 0:
         return found
     parabola, more = (polynomial(times - times.mean(), height, degree) for degree in (2, 4))

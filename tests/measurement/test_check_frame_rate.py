@@ -149,6 +149,16 @@ def test_what_nothing_brakes_tells_the_rate_to_some_per_cent(tmp_path):
     )
 
 
+def test_what_soon_falls_steadily_is_no_slow_clock(tmp_path):
+    """A paper cup: v = sqrt(g / c) tanh(sqrt(g c) t)."""
+    times, drag = np.arange(45) / 30, 3.8
+    fallen = np.log(np.cosh(np.sqrt(9.81 * drag) * np.maximum(times - 0.1, 0))) / drag
+    clip, seen = table(
+        tmp_path, {"scenario": "fall", "track_y": "up"}, times, np.stack([0 * times, 2.5 - fallen])
+    )
+    assert frame_rate_doubt(clip, seen) is None
+
+
 @pytest.mark.parametrize(("slope", "is_said"), [(24.0, True), (0.0, False)])
 def test_a_straight_way_down_is_no_swing(slope, is_said, tmp_path):
     times = np.arange(40) / 30

@@ -269,6 +269,14 @@ def test_a_ball_falls_from_a_hand_that_shakes_and_into_another(tmp_path, shakes_
         assert cuts[0].why == HELD and 0.4 < cuts[0].time_s < 0.5
 
 
+def test_what_the_air_stops_from_falling_faster_was_not_held(tmp_path) -> None:
+    """A paper cup, let go in the first row."""
+    times, drag = np.arange(42) / 30, 3.8
+    fallen = np.log(np.cosh(np.sqrt(9.81 * drag) * times)) / drag
+    place = np.stack([0 * times, 2.5 - fallen])
+    assert not measure(load_clip(table_of(tmp_path, "fall", times, place))).cuts
+
+
 def test_who_lifts_a_ball_before_it_falls_is_left_out(tmp_path) -> None:
     times = np.arange(120) / 60
     lifted = 0.3 * np.clip(times / 0.5, 0, 1)

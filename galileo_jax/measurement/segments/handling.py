@@ -32,8 +32,11 @@ MEETS = 6.0  # standard deviations: a parabola meets a place from which drag ben
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
 
 
-def hand_frame(observation: Observation) -> int | None:
-    """The first frame in which object 1 is free of the hand that moves it; None: at once."""
+def hand_frame(observation: Observation, least_m_s2: float = 0.0) -> int | None:
+    """The first frame in which object 1 is free of the hand that moves it; None: at once.
+
+    By `least_m_s2` the board alone may speed it up, as long as drag does not slow it.
+    """
     path = observation.path()
     if len(path) < 4 * FEWEST:
         return None
@@ -51,7 +54,7 @@ def hand_frame(observation: Observation) -> int | None:
     low, usual, high = np.quantile(found[on_way], [0.25, 0.5, 0.75])
     if usual <= 0 or high - low > MOST_SPREAD * usual:
         return None
-    is_held = (found < HELD * usual) | (found > PUSHED * usual)
+    is_held = (found < HELD * usual) | (found > max(PUSHED * usual, least_m_s2))
     is_held &= (np.abs(found - usual) > CLEAR * sd) & (middle < EARLY)
     return int(path.frames[starts[is_held][-1] + size]) if is_held.any() else None
 
@@ -96,10 +99,13 @@ def pushed_frame(observation: Observation, index: int = 0, least_m_s2: float = 0
     return int(path.frames[min(gains[-1] + size, len(path) - 1)])
 
 
-def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
+def thrown_frame(
+    observation: Observation, rest_belongs: bool, most_m_s2: float = 0.0
+) -> int | None:
     """The first frame in which object 1 is free of the hand that throws or drops it; None: at once.
 
-    It may lie still at first, without a hand, where its `rest_belongs` to the motion.
+    It may lie still at first, without a hand, where its `rest_belongs` to the motion. Down it may
+    speed up by `most_m_s2` without one, until drag slows it.
     """
     path = observation.path()
     if len(path) < 3 * FEWEST:
@@ -109,7 +115,7 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
         path = path[_leaves(path, gone, float(gone.max())) :]
     size, held, is_carried = _window(len(path)), -1, False
     while 3 * size <= len(path):
-        held, is_carried, is_clear = _last_held(path, size)
+        held, is_carried, is_clear = _last_held(path, size, most_m_s2)
         if held >= 0 or is_clear:
             break
         size *= 2  # so short a window does not tell the acceleration
@@ -168,7 +174,7 @@ def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:
     return len(left) - int(np.argmin(np.append(left[::-1], False)))
 
 
-def _last_held(path: PointPath, size: int) -> tuple[int, bool, bool]:
+def _last_held(path: PointPath, size: int, most_m_s2: float) -> tuple[int, bool, bool]:
     """Where the last window with a hand on begins, -1: none; and whether noise lets it show.
 
     Between these, whether the hand carried it: it fell less than `HELD` as fast as later.
@@ -181,8 +187,9 @@ def _last_held(path: PointPath, size: int) -> tuple[int, bool, bool]:
     apart, weight = _beside_free(found, velocity, is_later, sd)
     scatter = max(1.4826 * float(np.median(apart[is_later])), sd)
     clear = max(HELD * weight, CLEAR * scatter, CLEAR * float(np.quantile(apart[is_later], 0.75)))
-    held = np.flatnonzero((apart > clear) & ~is_later)
     usual = np.median(found[:, is_later], axis=1)
+    falls_freely = (found[1] < usual[1]) & (found[1] > -most_m_s2)
+    held = np.flatnonzero((apart > clear) & ~is_later & ~falls_freely)
     falls = usual @ found[:, held] / max(float(usual @ usual), np.finfo(float).tiny)
     is_carried = held.size and usual[1] < 0 and np.median(falls) < HELD
     last = int(starts[held[-1]]) if held.size else -1

@@ -63,6 +63,7 @@ IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
 PUSHED = "is pushed by a hand before that: it gains speed, and loses it from then on"
 SWINGS = ("pendulum", "spring", "liquid")
+FREELY = 1.2  # times gravity: what falls from rest speeds up by less
 EXPOSED_FRAMES = 1
 """Of a video: the hit falls into an exposure, whose frame shows neither before nor after."""
 
@@ -169,13 +170,17 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     kept = kept.cut("after", *_end_of_one(clip, kept.observation))
     if is_free and not clip.objects[0].first_frame:
         rest_belongs = clip.scenario == "fall"
-        free = handling.thrown_frame(kept.observation, rest_belongs)
+        is_told = rest_belongs and clip.is_scale_known
+        most_m_s2 = FREELY * clip.gravity if is_told else 0.0
+        free = handling.thrown_frame(kept.observation, rest_belongs, most_m_s2)
         if free is None and rest_belongs:
             free = handling.shaken_frame(kept.observation)
         return kept.cut("before", free, HELD)
     is_hand_asked = is_let_go and scenario.angle_deg != 0 and pushed is None
     return (
-        kept.cut("before", handling.hand_frame(kept.observation), HELD) if is_hand_asked else kept
+        kept.cut("before", handling.hand_frame(kept.observation, down_m_s2 or 0.0), HELD)
+        if is_hand_asked
+        else kept
     )
 
 
