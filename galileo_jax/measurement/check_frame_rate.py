@@ -123,16 +123,27 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
     )
 
 
-def swing_doubt(clip: Clip, observation: Observation) -> str | None:
-    """One line where what should hang on a thread goes straight down, one way; None elsewhere."""
-    if clip.scenario != "pendulum" or not observation.mask[0].any():
+def path_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where what should hang on a thread, or fall, goes straight elsewhere; else None."""
+    seen, name = observation.mask[0], observation.names[0]
+    if clip.scenario not in ("pendulum", "fall") or not seen.any():
         return None
-    likely = likely_in_plane(*observation.position_m[0, :2][:, observation.mask[0]])
+    place = observation.position_m[0, :2][:, seen]
+    if clip.scenario == "fall":
+        gone = place - place[:, :1]
+        across, up = gone[:, int(np.argmax(np.hypot(*gone)))]
+        if abs(across) <= abs(up):  # no camera is turned by more
+            return None
+        return (
+            f"{clip.path}: {name} goes across by {abs(across):.3g} m and down by {-up:.3g} m, and "
+            "what falls goes down: is it the thing that is meant (`--point X Y`)?"
+        )
+    likely = likely_in_plane(*place)
     if likely.scenario not in ("incline", "fall") or not likely.is_clear:
         return None
     return (
-        f"{clip.path}: {observation.names[0]} goes {likely.why} and does not turn back; what hangs "
-        f"on a thread goes along an arc (perhaps scenario: {likely.scenario})"
+        f"{clip.path}: {name} goes {likely.why} and does not turn back; what hangs on a thread "
+        f"goes along an arc (perhaps scenario: {likely.scenario})"
     )
 
 

@@ -15,7 +15,7 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.check_frame_rate import (
     apparent_gravity,
     frame_rate_doubt,
-    swing_doubt,
+    path_doubt,
 )
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
@@ -119,6 +119,16 @@ def test_a_unit_is_likelier_than_another_rate(per_metre, unit, tmp_path):
     assert "likely fps" not in doubt
 
 
+@pytest.mark.parametrize(("slope", "is_said"), [(0.0, True), (70.0, False)])
+def test_what_goes_across_does_not_fall(slope, is_said, tmp_path):
+    """A hand, perhaps, that was followed in place of the ball."""
+    clip, seen = fall(tmp_path)
+    way, angle = 4.0 * seen.times_s**2, math.radians(slope)
+    place = np.stack([way * math.cos(angle), -way * math.sin(angle)])
+    doubt = path_doubt(clip, replace(seen, position_m=place[None]))
+    assert (doubt is not None and "--point" in doubt) == is_said
+
+
 def test_nonsense_is_not_likely(tmp_path):
     """What is 5,000 times too slow was not filmed at another rate."""
     clip, seen = fall(tmp_path)
@@ -167,7 +177,7 @@ def test_a_straight_way_down_is_no_swing(slope, is_said, tmp_path):
     angle = np.radians(slope)
     place = np.stack([way * np.cos(angle), 1.0 - way * np.sin(angle) + (0 if is_said else way**2)])
     clip, seen = table(tmp_path, {"scenario": "pendulum"}, times, place)
-    assert (swing_doubt(clip, seen) is not None) == is_said
+    assert (path_doubt(clip, seen) is not None) == is_said
 
 
 def test_eleven_coarse_rows_tell_enough(tmp_path):
