@@ -186,9 +186,8 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
         found = ApparentGravity(value, sd=scatter / math.sqrt(len(windows) / 2))
         after = windows[int(np.argmax(windows)) :]
         if after[0] > LEVELS_OFF * after[-1] and after.min() > -after[0] / LEVELS_OFF:
-            found = ApparentGravity(
-                float(after[0]), is_least=True
-            )  # the air stops it falling faster
+            # The air stops it falling ever faster.
+            found = ApparentGravity(float(after[0]), is_least=True)
     if size < 1 or np.ptp(height) == 0:
         return found
     parabola, more = (polynomial(times - times.mean(), height, degree) for degree in (2, 4))

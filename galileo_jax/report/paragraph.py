@@ -164,11 +164,10 @@ def _otherwise(
     """The friction coefficients with what else explains the data, where they are others."""
     if diagnosis is None:
         return ""
-    text, own = "", set(result["effects"])
+    text, asked = "", diagnosis["verdict"]["effects"]
     for row in diagnosis["candidates"]:
-        if row["effect"] not in diagnosis["verdict"]["effects"] or own == set(
-            row["effect"].split("+")
-        ):
+        effects = row["effect"].split("+")
+        if row["effect"] not in asked or set(effects) == set(result["effects"]):
             continue
         others = [
             f"{name} is {_value(other)}"
@@ -176,11 +175,8 @@ def _otherwise(
             if FRICTION.fullmatch(name) and (other := row.get("parameters", {}).get(name))
             if abs(other["mean"] - entry["mean"]) > OTHER_SDS * hypot(other["sd"], entry["sd"])
         ]
-        text += (
-            f"; with {_words(row['effect']).replace('+', ' and ')} {listed(others)}"
-            if others
-            else ""
-        )
+        if others:
+            text += f"; with {listed(list(map(_words, effects)))} {listed(others)}"
     return text
 
 

@@ -18,6 +18,7 @@ from galileo_jax.table.text import content_of, decoded
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,|])\s*", re.IGNORECASE)  # Excel's own first line
 COMMENT = re.compile(r"\s*(#+|%+|!+|//)\s?")
+QUOTED = re.compile(r'"([^"]*)"')
 SAMPLE = 60  # lines that tell the dialect; from the middle on, where no titles are
 MAX_CELLS, MAX_LINE = 4_000_000, 200_000
 MAX_COLUMNS = 1000
@@ -103,7 +104,10 @@ def _cells(line: str, separator: str) -> list[str]:
     if separator == ", ":
         return [cell.strip().strip('"').strip() for cell in re.split(r",\s+", line.strip())]
     if separator == " ":
-        return [cell.strip('"') for cell in line.split()]
+        cells = line.split()
+        # Quotes round cells between tabs are those of tabs, and one that is alone is a whole line.
+        is_plain = len(cells) > 1 and "\t" not in line
+        return [QUOTED.sub(r"\1", cell) for cell in cells] if is_plain else cells
     try:
         row = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     except csv.Error:
