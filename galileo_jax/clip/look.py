@@ -13,9 +13,9 @@ from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
 STRAIGHT = 0.03  # of a path's length: what stays within this of a line is straight
 LEVEL_DEG, STEEP_DEG = 2.0, 60.0
-SETS_OUT = 0.05  # of the longest way of all bodies: who is so far away has set out
 """Between these a straight way is a slope; a steeper one may be a table seen from above."""
 
+SETS_OUT = 0.05  # of the longest way of all bodies: who is so far away has set out
 SWINGS = 3  # turns back of a motion that swings
 FEWEST_ON_A_LINE, ENOUGH_PLACES = 4, 200
 """Places that tell how straight a piece of a path is; of a whole path more are not looked at."""

@@ -285,7 +285,7 @@ def _placed(
 
 
 OURS = re.compile(r"time_s|\w+_[xy]_m", re.IGNORECASE)
-OUR_BODY = re.compile(r"object\d+(_\w+)?|\w+_[xyz]_m|[xyz]_m", re.IGNORECASE)
+OUR_BODY = re.compile(r"object\d+(_\w+)?|(\w+_)?[xyz]_m", re.IGNORECASE)
 
 
 def _is_ours(path: Path) -> bool:

@@ -41,7 +41,7 @@ from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views
 from galileo_jax.diagnosis.reasons import because
 from galileo_jax.diagnosis.remarks import with_known_constants, with_second
 from galileo_jax.diagnosis.stakes import VerdictStakes, decisive_margin
-from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
+from galileo_jax.diagnosis.thresholds import CONVINCING
 from galileo_jax.diagnosis.verdict import (
     AS_EFFECTS,
     UNEVEN,
@@ -226,7 +226,7 @@ def _concluded(
         return settled
     judge.on_stage("fitting pairs of effects")
     table = search(table, 2, listener.on_entry)
-    if settled is not None and rough is not None and not _is_contested(rough, table):
+    if settled is not None and rough is not None and not rough.is_contested_by(table):
         return settled
     # A pair or a formula may explain it.
     why, found = _searched(table, judge, candidates, listener)
@@ -248,18 +248,6 @@ def _settled(rough: ImperfectWorld, candidates: Sequence[Candidate]) -> _Conclus
     if verdict.status == "unknown" or is_uneven:
         return None
     return _Conclusion(verdict, rough.with_the_rest(candidates), rough=rough)
-
-
-def _is_contested(rough: ImperfectWorld, table: Table) -> bool:
-    """Whether two effects in an exact world are about as probable as the best of the imperfect one.
-
-    Imperfections of usual sizes beside one effect may stand for a second.
-    """
-    base, best = rough.base.fit.log_evidence, rough.table[0].log_odds
-    return any(
-        pair.fit.log_evidence + table.stakes.log_prior(pair) - base > best - DECISIVE
-        for pair in table.named(2)
-    )
 
 
 def _searched(

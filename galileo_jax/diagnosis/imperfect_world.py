@@ -24,6 +24,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.imperfect import with_imperfections
+from galileo_jax.search.table import Table
 from galileo_jax.statespace.terms import ROUGHNESS
 
 # Beside none: so many of the most probable of each kind in the exact world, and pairs that contest
@@ -78,18 +79,31 @@ class ImperfectWorld:
 
     def is_beaten_by(self, candidates: Sequence[Candidate]) -> bool:
         """Whether an effect in an exact world is far more probable than none in this one."""
-        base = self.base.fit.log_evidence
         return any(
-            explains(c) and c.hypothesis.fit.log_evidence + c.log_prior - base >= CONVINCING
+            explains(c) and self._log_evidence(c.hypothesis) + c.log_prior >= CONVINCING
             for c in candidates
         )
+
+    def is_contested_by(self, table: Table) -> bool:
+        """Whether two effects in an exact world are about as probable as the best of this one.
+
+        Imperfections of usual sizes beside one effect may stand for a second.
+        """
+        least = self.table[0].log_odds - DECISIVE
+        return any(
+            self._log_evidence(pair) + table.stakes.log_prior(pair) > least
+            for pair in table.named(2)
+        )
+
+    def _log_evidence(self, exact: Hypothesis) -> float:
+        """Of a hypothesis in an exact world over none in this one, nats."""
+        return exact.fit.log_evidence - self.base.fit.log_evidence
 
     def with_the_rest(self, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
         """The table and, of candidates that are not in it, the exact fits over the same base."""
         known = {c.effects for c in self.table}
-        base = self.base.fit.log_evidence
         rest = [
-            replace(c, log_evidence=c.hypothesis.fit.log_evidence - base, p_value=None)
+            replace(c, log_evidence=self._log_evidence(c.hypothesis), p_value=None)
             for c in candidates
             if c.effects not in known
         ]
@@ -118,12 +132,10 @@ def _best(candidates: Sequence[Candidate]) -> list[Candidate]:
     named = [c for c in candidates if c.law is None and not c.is_form]
     pairs = [c for c in named if len(c.effects) > 1]
     single = [c for c in named if len(c.effects) == 1]
-    near = [c for i, c in enumerate(pairs) if i < NUM_PAIRS or _contests(c, pairs[0])]
+    near = [
+        c for i, c in enumerate(pairs) if i < NUM_PAIRS or pairs[0].log_odds - c.log_odds < DECISIVE
+    ]
     return [*laws[:NUM_LAWS], *forms[:NUM_FORMS], *near, *single[:NUM_SINGLE]]
-
-
-def _contests(candidate: Candidate, best: Candidate) -> bool:
-    return best.log_odds - candidate.log_odds < DECISIVE
 
 
 def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Candidate | None:

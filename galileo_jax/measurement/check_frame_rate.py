@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from galileo_jax.clip.look import likely_in_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
@@ -120,30 +119,6 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
     return (
         f"{speeds_up}; a slope of {angle:g} degrees gives {most:.3g} without any friction: check "
         "ramp_angle_deg, the times and the scale, or something pulls it"
-    )
-
-
-def path_doubt(clip: Clip, observation: Observation) -> str | None:
-    """One line where what should hang on a thread, or fall, goes straight elsewhere; else None."""
-    seen, name = observation.mask[0], observation.names[0]
-    if clip.scenario not in ("pendulum", "fall") or not seen.any():
-        return None
-    place = observation.position_m[0, :2][:, seen]
-    if clip.scenario == "fall":
-        gone = place - place[:, :1]
-        across, up = gone[:, int(np.argmax(np.hypot(*gone)))]
-        if abs(across) <= abs(up):  # no camera is turned by more
-            return None
-        return (
-            f"{clip.path}: {name} goes across by {abs(across):.3g} m and down by {-up:.3g} m, and "
-            "what falls goes down: is it the thing that is meant (`--point X Y`)?"
-        )
-    likely = likely_in_plane(*place)
-    if likely.scenario not in ("incline", "fall") or not likely.is_clear:
-        return None
-    return (
-        f"{clip.path}: {name} goes {likely.why} and does not turn back; what hangs on a thread "
-        f"goes along an arc (perhaps scenario: {likely.scenario})"
     )
 
 

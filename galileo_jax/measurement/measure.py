@@ -21,7 +21,7 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.average_rows import with_rows_averaged
-from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, path_doubt, speed_doubt
+from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import (
@@ -34,6 +34,7 @@ from galileo_jax.measurement.infer_ramp import (
 from galileo_jax.measurement.path_direction import (
     OtherWay,
     other_way,
+    path_doubt,
     rises_forward,
     turned_back,
     way_text,

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.clip.fields import MIN_RAMP_ANGLE_DEG
+from galileo_jax.clip.look import likely_in_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
@@ -131,3 +132,27 @@ def way_text(clip: Clip, way: OtherWay) -> str:
         else ", which is used; check the angle, and whether the camera stood level"
     )
     return f"{clip.objects[0].name}'s path {path}, but {declared}{what_then}"
+
+
+def path_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where what should hang on a thread, or fall, goes straight elsewhere; else None."""
+    seen, name = observation.mask[0], observation.names[0]
+    if clip.scenario not in ("pendulum", "fall") or not seen.any():
+        return None
+    place = observation.position_m[0, :2][:, seen]
+    if clip.scenario == "fall":
+        gone = place - place[:, :1]
+        across, up = gone[:, int(np.argmax(np.hypot(*gone)))]
+        if abs(across) <= abs(up):  # no camera is turned by more
+            return None
+        return (
+            f"{clip.path}: {name} goes across by {abs(across):.3g} m and down by {-up:.3g} m, and "
+            "what falls goes down: is it the thing that is meant (`--point X Y`)?"
+        )
+    likely = likely_in_plane(*place)
+    if likely.scenario not in ("incline", "fall") or not likely.is_clear:
+        return None
+    return (
+        f"{clip.path}: {name} goes {likely.why} and does not turn back; what hangs on a thread "
+        f"goes along an arc (perhaps scenario: {likely.scenario})"
+    )

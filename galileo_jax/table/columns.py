@@ -222,7 +222,7 @@ def _with_labels(columns: Columns) -> Columns:
     times = columns.numbers[clock[0]].values.tolist()
     if len(set(times)) == len(times):
         return columns
-    for n in set(range(len(columns.meanings))) - set(columns.numbers):
+    for n in (n for n in range(len(columns.meanings)) if n not in columns.numbers):
         words = [row[n] if n < len(row) else "" for _, row in columns.heading.body]
         labels = list(dict.fromkeys(words))
         if "" in labels or len(labels) < 2 or len(set(zip(words, times, strict=True))) < len(times):

@@ -15,9 +15,9 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.check_frame_rate import (
     apparent_gravity,
     frame_rate_doubt,
-    path_doubt,
 )
 from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.path_direction import path_doubt
 from galileo_jax.observation.observation import Observation
 from tests.measurement.seen import seen as observed_at
 from tests.oracle_run import HIT, make_run

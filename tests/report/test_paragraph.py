@@ -198,6 +198,7 @@ def test_a_law_has_its_constants_in_its_formula():
     ("check", "more", "said"),
     [
         (BAD, {}, "The data contradict the model (p < 1e-12)."),
+        (CHECK | {"rests_on_imperfections": True}, {}, "imperfections; an effect may be better."),
         (CHECK | {"adequate": None}, {"no_verdict": "a.yaml: only 5 frames"}, "only 5 frames."),
         (
             CHECK | {"noise_misstated": True, "noise_scale": [3.04]},

@@ -111,8 +111,7 @@ def thrown_frame(
     if len(path) < 3 * FEWEST:
         return None
     if rest_belongs:
-        gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
-        path = path[_leaves(path, gone, float(gone.max())) :]
+        path = path[_begins(path)[0] :]
     size, held, is_carried = _window(len(path)), -1, False
     while 3 * size <= len(path):
         held, is_carried, is_clear = _last_held(path, size, most_m_s2)
@@ -136,12 +135,11 @@ def shaken_frame(observation: Observation) -> int | None:
     agree, as those of a rest do.
     """
     path = observation.path()
-    gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
-    free = _leaves(path, gone, float(gone.max(initial=0.0)))
+    free, way_m = _begins(path)
     held = path[: max(free - SMEARED, 0)]
     if len(held) < FEWEST or free + 1 >= len(path):
         return None
-    return None if is_one_place(held, float(gone.max())) else int(path.frames[free + 1])
+    return None if is_one_place(held, way_m) else int(path.frames[free + 1])
 
 
 def comes_free(observation: Observation, last: int) -> bool:
@@ -165,6 +163,13 @@ def comes_free(observation: Observation, last: int) -> bool:
 def _window(frames: int) -> int:
     """How many of the frames in motion tell an acceleration."""
     return max(FEWEST, round(WINDOW_SHARE * frames))
+
+
+def _begins(path: PointPath) -> tuple[int, float]:
+    """The first place from which on it is clearly away from the first; and how far it comes, m."""
+    gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
+    way_m = float(gone.max(initial=0.0))
+    return _leaves(path, gone, way_m), way_m
 
 
 def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:
