@@ -14,7 +14,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.grid import COMMENT
 from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_number
-from galileo_jax.table.titles import LENGTHS, Title, title_of, unit_of
+from galileo_jax.table.titles import LENGTHS, Title, is_turning, title_of, unit_of
 
 MULTI = "multi:"
 AXES = ("x", "y", "z")
@@ -23,6 +23,7 @@ RATES = (
     *("export frame rate", "capture frame rate", "datarate", "camerarate"),
 )
 UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit")
+NEAR_TITLES = 3  # rows: so near above the titles stand numbers of bodies
 MARKERS = "marker_names"  # motion capture: three columns for each of the names that follow
 
 
@@ -55,7 +56,8 @@ def split_heading(rows: Rows) -> Heading:
     usual = statistics.median(sum(map(bool, row)) for row in later)  # filled cells
     start = next(
         (n for n, (_, row) in enumerate(rows)
-         if _is_body(row, words) and 2 * sum(map(bool, row)) > usual), None)  # fmt: skip
+         if _is_body(row, words) and 2 * sum(map(bool, row)) > usual
+         and not _first_titles_below(rows, n)), None)  # fmt: skip
     if start is None:
         raise InputError(
             f"no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
@@ -67,9 +69,10 @@ def split_heading(rows: Rows) -> Heading:
     while not _has_number(body[-1][1]):  # words below the table
         body.pop()
     counts = [_num_titles(row) for _, row in above]
-    if not any(counts):
+    if max(counts, default=0) < 2:
+        above = _listed_titles(above, max(len(row) for _, row in body)) or above
         above += _marker_titles(above)
-        counts += [len(row) for _, row in above[start:]]
+        counts = [_num_titles(row) for _, row in above]
     at = max(range(len(counts)), key=lambda n: (counts[n], n), default=-1)
     if at < 0 or not counts[at]:
         # Titles in words that are not known are the last row that fills the columns; a comment
@@ -87,14 +90,15 @@ def split_heading(rows: Rows) -> Heading:
         titles = ["", *titles]
     body = [(line, row) for line, row in body if at < 0 or row != above[at][1]]
     titles = _with_clock_above(titles, [row for _, row in above[: max(at, 0)]])
-    if at >= 0:
-        _check_lengths(body, words, titles)
     units = next((row for _, row in above if _is_units(row)), [])
     over = [
         row
         for line, row in above[: max(at, 0)]
-        if not (_is_units(row) or line in commented or _is_titles_again(row, titles))
+        if not (_is_units(row) or _has_number(row) or line in commented)
+        and not _is_titles_again(row, titles)
     ]
+    if at >= 0:
+        _check_lengths(body, words, [titles, *over])
     names = _names(over, width)
     told = next((cell for cell in _beside(above, UNIT_OF_LENGTH) if unit_of(cell) in LENGTHS), "")
     meanings = []
@@ -106,6 +110,8 @@ def split_heading(rows: Rows) -> Heading:
             meaning = replace(meaning, unit=unit_of(told))
         if not meaning.name and n < len(names) and meaning.role not in ("time", "frame"):
             meaning = replace(meaning, name=names[n])
+        if any(n < len(row) and is_turning(row[n]) for row in over):
+            meaning = replace(meaning, role="")  # motion capture: of a rotation, 'X' is none
         meanings.append(meaning)
     is_titled = any(one.role for one in meanings)
     return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
@@ -207,14 +213,34 @@ def _marker_titles(above: Rows) -> Rows:
             for line, names in found[:1]]  # fmt: skip
 
 
-def _check_lengths(body: Rows, words: set[int], titles: list[str]) -> None:
-    """Refuses a row that has cells beyond the titles."""
+def _listed_titles(above: Rows, width: int) -> Rows:
+    """Rows of titles and of units where each stands in a line of its own, as Regressi has them."""
+    runs = []
+    for first in range(len(above) - width + 1):
+        part = above[first : first + width]
+        if width > 1 and all(len(row) == 1 for _, row in part):
+            runs.append((part[-1][0], [row[0] for _, row in part]))
+    titles = next((run for run in runs if _num_titles(run[1]) > 1), None)
+    units = next((run for run in runs if _is_units(run[1])), None)
+    return [run for run in (titles, units) if run is not None and titles is not None]
+
+
+def _first_titles_below(rows: Rows, n: int) -> bool:
+    """Whether titles, two or more in a row, stand soon below row n, and none above it."""
+    above, below = rows[:n], rows[n + 1 : n + 1 + NEAR_TITLES]
+    titled = [[_num_titles(row) > 1 for _, row in part] for part in (above, below)]
+    return any(titled[1]) and not any(titled[0])
+
+
+def _check_lengths(body: Rows, words: set[int], heading: list[list[str]]) -> None:
+    """Refuses a row that has cells beyond the titles, the first row of the `heading`, and names."""
 
     def num_used(row: list[str]) -> int:
         return max((n + 1 for n, cell in enumerate(row) if cell and n not in words), default=0)
 
     line, row = max(body, key=lambda one: (num_used(one[1]), -one[0]))
-    named = max((n + 1 for n, title in enumerate(titles) if title), default=0)
+    titles = heading[0]
+    named = max((n + 1 for row in heading for n, title in enumerate(row) if title), default=0)
     if num_used(row) <= named:
         return
     hint = "give every column a title"
@@ -237,7 +263,7 @@ def _names(rows: list[list[str]], width: int) -> list[str]:
     """The object's name over each column: a name stands over its first column, or over each."""
     filled = []
     for row in rows:
-        if not any(row) or row[0].lower().lstrip("#") == MULTI or _has_number(row):
+        if not any(row) or row[0].lower().lstrip("#") == MULTI:
             continue
         names = []
         last = next(filter(None, row)) if sum(map(bool, row)) == 1 else ""  # of one object

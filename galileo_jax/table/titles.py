@@ -21,9 +21,10 @@ def _by_word(words_of: dict[Any, str]) -> dict[str, Any]:
 
 _LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"))
 WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
-FILLERS, DERIVED, OTHER_UNITS = (
-    frozenset(_LISTS[key].split()) for key in ("fillers", "derived", "other_units")
+FILLERS, TURNINGS, OTHER_UNITS = (
+    frozenset(_LISTS[key].split()) for key in ("fillers", "turnings", "other_units")
 )
+DERIVED = TURNINGS | frozenset(_LISTS["derived"].split())
 SYMBOLS = frozenset("va")
 """Of quantities made from places; 'A X' is the place of A, and so is 'a x (cm)'."""
 
@@ -62,6 +63,11 @@ def is_no_place(text: str) -> bool:
     words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
     is_derived = any(word.rstrip("0123456789") in DERIVED for word in words)
     return is_derived or any(unit in OTHER_UNITS for unit in BRACKETS.findall(text))
+
+
+def is_turning(text: str) -> bool:
+    """Whether a text says how a body lies or turns: 'Rotation'."""
+    return not TURNINGS.isdisjoint(text.lower().split())
 
 
 def title_of(text: str) -> Title:

@@ -365,6 +365,31 @@ def test_a_length_in_unknown_words_beside_one_axis_is_the_other(tmp_path: Path) 
     assert read(tmp_path, text("t (s);x (cm);quer", body=SEMI)).axes == ("x",)
 
 
+def test_numbers_of_bodies_and_words_for_rotations_stand_above_the_titles(tmp_path: Path) -> None:
+    """As Motive writes rigid bodies: 'X' under 'Rotation' is no place."""
+    heading = (
+        "Format Version,1.23,Take Name,1,Rotation Type,Quaternion,Length Units,Meters",
+        ",,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body",
+        ",,block,block,block,block,block",
+        ",,1,1,1,1,1",
+        ",,Rotation,Rotation,Position,Position,Mean Marker Error",
+        "Frame,Time (Seconds),X,Y,X,Y,",
+    )
+    body = [f"{n},{t},.1,.2,{x},{y},.001" for n, (t, x, y) in enumerate(truth().T)]
+    table = read(tmp_path, text(*heading, body=body))
+    assert len(table.names) == 1 and table.axes == ("x", "y") and table.unit == "m"
+    check(table)
+
+
+def test_each_title_in_a_line_of_its_own(tmp_path: Path) -> None:
+    """As Regressi has them."""
+    heading = ("EVARISTE REGRESSI WINDOWS 1.0", "&3 NOM VAR", "t", "x", "y", "&3 UNITE VAR")
+    body = [f" {t:.6f} {x:.6f} {y:.6f}" for t, x, y in truth().T]
+    table = read(tmp_path, text(*heading, "s", "cm", "cm", "&21 VALEUR VAR", body=body))
+    assert table.unit == "cm" and table.axes == ("x", "y")
+    check(table)
+
+
 def test_titles_in_several_forms_above_each_other_are_no_names(tmp_path: Path) -> None:
     """As TrackMate writes them: for programs, for people, in short, and units."""
     heading = (
