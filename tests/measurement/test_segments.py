@@ -145,6 +145,13 @@ def test_what_soon_goes_steadily_is_not_struck(fps, settles_s):
     assert blow_frame(slid(slows, fps)) is None
 
 
+def test_weight_turns_a_throw_down_while_it_is_out_of_sight():
+    times = np.delete(np.arange(50) / 50, slice(14, 23))
+    place = np.stack([1.8 * times, 1 + 3.4 * times - 4.905 * times**2])
+    thrown = seen(place, times, 1e-3)
+    assert arrest_frame(thrown) is None and blow_frame(thrown) is None
+
+
 def test_one_bad_point_is_no_blow():
     way = 1.2 * np.arange(1, 240) / 240
     run = slid(way, 240.0)

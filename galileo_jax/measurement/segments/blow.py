@@ -138,7 +138,7 @@ def arrest_frame(observation: Observation) -> int | None:
 
         v_i < SLOWED v,   and no v_j > SLOWED v after it,   v = median of steps i - 2, i - 3, i - 4
         v_(i-2) > STEADY v                                  (what brakes slows down step by step)
-        (v - v_i) / n steps > HIT_M_S2                      (and no friction brakes like a wall)
+        (v - v_i) / (n steps) > HIT_M_S2                     (and no friction brakes like a wall)
         v > STOP_CLEAR standard deviations of a step
 
     n is 1, or 2 where the hit is smeared over two steps: v_(i-1) < STEADY v.
@@ -152,7 +152,7 @@ def arrest_frame(observation: Observation) -> int | None:
         usual = np.median(going[own])
         is_clear = usual > STOP_CLEAR * np.median(speed_sd[own])
         is_smeared = going[i - 1] <= STEADY * usual
-        braked_m_s2 = (usual - going[i]) / (step_s[i] * (2 if is_smeared else 1))
+        braked_m_s2 = (usual - going[i]) / step_s[i - is_smeared : i + 1].sum()
         is_hit = braked_m_s2 > HIT_M_S2 and going[i - 2] > STEADY * usual
         if is_clear and is_hit and going[i:].max() < SLOWED * usual:
             return int(path.frames[i - 1 if is_smeared else i])
