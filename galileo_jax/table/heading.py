@@ -120,23 +120,44 @@ def split_heading(rows: Rows) -> Heading:
 def one_below_the_other(heading: Heading) -> Heading:
     """Runs that stand side by side, each with its own times, as motions that follow each other.
 
-    Their columns have the same titles in the same order, but for the data set's name before a
-    colon, and other times, if there is no such name.
+    Their columns mean the same in the same order. They are runs if a data set's name stands before
+    a colon, or their times differ; columns of named bodies only if no clock goes on in another.
     """
-    plain = [title.rpartition(":")[2].strip() for title in heading.titles]
+    used = [n for n, title in enumerate(heading.titles) if title]
+    plain = [_plain(heading, n) for n in used]
     may_be = (n for n in range(2, len(plain) // 2 + 1) if len(plain) % n == 0)
     width = next((n for n in may_be if plain == plain[:n] * (len(plain) // n)), 0)
-    own = heading.meanings[:width]
+    own = [replace(heading.meanings[n], name="") for n in used[:width]]
     clock = next((n for n, one in enumerate(own) if one.role == "time"), None)
-    if clock is None or any(one.name for one in heading.meanings):
+    if clock is None:
         return heading
-    blocks = [slice(n, n + width) for n in range(0, len(plain), width)]
-    each = [[(line, row[part]) for line, row in heading.body if any(row[part])] for part in blocks]
-    times = [[row[clock] for _, row in rows] for rows in each]
-    is_named = len({title.rpartition(":")[0] for title in heading.titles}) == len(blocks)
-    if not is_named and times == times[:1] * len(blocks):
+    blocks = [used[n : n + width] for n in range(0, len(used), width)]
+    rows = [
+        [[row[n] if n < len(row) else "" for n in block] for _, row in heading.body]
+        for block in blocks
+    ]
+    each = [
+        [(line, cells) for (line, _), cells in zip(heading.body, block, strict=True) if any(cells)]
+        for block in rows
+    ]
+    times = [[cells[clock] for _, cells in block] for block in each]
+    is_set = len({heading.titles[n].rpartition(":")[0] for n in used}) == len(blocks)
+    if any(heading.meanings[n].name for n in used):
+        apart = (set(one) - set(other) for one in times for other in times if one is not other)
+        is_run = all(apart)
+    else:
+        is_run = is_set or times != times[:1] * len(blocks)
+    if not is_run:
         return heading
-    return replace(heading, titles=tuple(plain[:width]), meanings=own, body=[*chain(*each)])
+    titles = tuple(heading.titles[n].rpartition(":")[2].strip() for n in used[:width])
+    return replace(heading, titles=titles, meanings=tuple(own), body=[*chain(*each)])
+
+
+def _plain(heading: Heading, n: int) -> tuple[str, str | None]:
+    """What a column means, whichever run it is of: its role, or its words; and its unit."""
+    meaning = heading.meanings[n]
+    words = heading.titles[n].rpartition(":")[2].strip(" 0123456789").lower()
+    return meaning.role or words, meaning.unit
 
 
 def _has_row_names(titles: list[str], body: Rows) -> bool:

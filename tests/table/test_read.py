@@ -252,12 +252,32 @@ def test_a_unit_and_a_rate_in_the_heading(tmp_path: Path) -> None:
     assert (table.unit, table.frame_s) == ("m", 1 / 25)
 
 
-def test_two_clocks_in_one_table_are_refused(tmp_path: Path) -> None:
-    body = [f"{t},{y},{2 * t},{y}" for t, _, y in truth().T]
-    with pytest.raises(InputError, match="'t1' and 't2' are two clocks"):
-        read(tmp_path, text("t1,y1,t2,y2", body=body))
-    with pytest.raises(InputError, match=r"Run #1' and 'Time .s. Run #2' are two clocks"):
-        read(tmp_path, text("Time (s) Run #1,y Run #1,Time (s) Run #2,y Run #2", body=body))
+@pytest.mark.parametrize(
+    "heading",
+    [
+        ("t1,y1,t2,y2",),
+        ("Time (s) Run #1,y Run #1,Time (s) Run #2,y Run #2",),
+        ("run 1,,run 2,", "t,y,t,y"),
+    ],
+)
+def test_clocks_that_differ_are_those_of_runs(tmp_path: Path, heading) -> None:
+    body = [f"{t},{y},{t + 0.003:.4f},{y}" for t, _, y in truth().T]
+    table = read(tmp_path, text(*heading, body=body))
+    assert len(table.starts) == 2 and len(table.names) == 1
+    np.testing.assert_allclose(table.position[0, 0], np.tile(truth()[2], 2))
+    apart = read(
+        tmp_path,
+        text("t,y,,t,y", body=[row.replace(",", ",,", 2).replace(",,", ",", 1) for row in body]),
+    )
+    assert len(apart.starts) == 2, "an empty column between them"
+
+
+def test_bodies_with_one_clock_are_no_runs(tmp_path: Path) -> None:
+    """The second comes into the picture later."""
+    rows = [f"{t},{x},{y}" for t, x, y in truth().T]
+    body = [f"{row},{rows[n + 4]}" if n + 4 < ROWS else f"{row},,," for n, row in enumerate(rows)]
+    with pytest.raises(InputError, match="are two clocks"):
+        read(tmp_path, text("a t,a x,a y,b t,b x,b y", body=body))
 
 
 @pytest.mark.parametrize("titles", ["t,t2,x,y", "t,x,y,t2", "time,real time,x,y"])
