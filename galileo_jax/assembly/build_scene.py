@@ -17,6 +17,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
 EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt; of a way that turns back
+FEWEST = 3  # places that tell when it was let go
 TURNED = 0.99  # of its way, where what ended nearer has turned back
 
 
@@ -116,9 +117,10 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
         gone = np.where(place[0] < 0, gone, 0.0)
     moving = gone > 0.05 * gone.max()
     if clip.scenario == "fall" or gone[-1] < TURNED * gone.max():
-        moving &= gone < EARLY_SHARE * gone.max()
         moving &= np.arange(len(gone)) <= np.argmax(gone)  # it may come back up
-    if gone.max() <= 0 or moving.sum() < 3:
+        early = moving & (gone < EARLY_SHARE * gone.max())
+        moving = early if early.sum() >= FEWEST else moving  # it may be out of sight at first
+    if gone.max() <= 0 or moving.sum() < FEWEST:
         return float(times[0]), frame_s
     slope, intercept = np.polyfit(times[moving], np.sqrt(gone[moving]), 1)
     if slope <= 0:

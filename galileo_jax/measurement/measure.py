@@ -185,9 +185,12 @@ def measure(clip: Clip) -> Measurement:
     doubts = [] if way is None else [f"{clip.path}: {way_text(clip, way)}"]
     overlay = f"see the overlay: galileo track {clip.source or clip.path}"
     doubts += [] if doubt is None else [doubt]
-    doubts += [f"{clip.path}: {one}: {one.why}; {overlay}" for one in segments.astray]
+    strays = [f"{one}: {one.why}; {overlay}" for one in segments.astray]
+    doubts += [f"{clip.path}: {one}" for one in strays]
     of_scene = _of_scene(clip, tracked, segments, pixels)
     impossible = doubt and doubt.removeprefix(f"{clip.path}: ")
+    if impossible is None and any(one.is_left_out for one in segments.astray):
+        impossible = strays[0]  # what is left may be of something else, too
     return Measurement(
         clip, observation, whole, pixels, told.inferred, segments, tuple(doubts), impossible,
         tuple(told.remarks), way, frames_used, len(whole.times_s), of_scene,

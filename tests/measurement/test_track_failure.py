@@ -94,6 +94,8 @@ def test_a_lost_object_is_told_with_its_time(clip: Path, change: Change, why: st
     (doubt,) = found.doubts
     assert f"object1 is lost from {one.time_s:.2f} s on: {one.why}" in doubt
     assert "see the overlay: galileo track" in doubt
+    is_first = found.impossible is not None
+    assert is_first == (change is twin_stays), "what is before a leap may be wrong, too"
 
 
 def test_the_status_of_a_fit_says_that_it_is_of_a_lost_object(clip: Path, tmp_path: Path) -> None:

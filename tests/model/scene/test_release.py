@@ -78,3 +78,16 @@ def test_what_moves_in_the_first_row_of_a_table_of_others_starts_moving(tmp_path
     measured = measure(load_clip(path))
     assert measured.clip.starts_moving
     assert any("its speed there is inferred" in line for line in measured.remarks)
+
+
+def test_what_falls_out_of_sight_was_let_go_before(tmp_path: Path) -> None:
+    times = np.delete(np.arange(36) / 60, slice(14, 23))
+    height = 1.8 - 4.905 * np.maximum(times - 0.08, 0) ** 2
+    rows = [f"{t:.4f},{y:.4f}" for t, y in zip(times, height, strict=True)]
+    (tmp_path / "gap.csv").write_text("\n".join(["t (s),y (m)", *rows]) + "\n")
+    (tmp_path / "gap.yaml").write_text(
+        "track: gap.csv\nscenario: fall\nobjects: [{name: ball, shape: sphere}]\n"
+    )
+    measured = measure(load_clip(tmp_path / "gap.yaml"))
+    release_s, sd_s = build_scene(measured.clip, measured.observation).surroundings.release_s
+    assert abs(release_s - 0.08) < sd_s
