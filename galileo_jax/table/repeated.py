@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from galileo_jax.numerics.runs import stretches
 from galileo_jax.table.clock import COMMON_FPS
 from galileo_jax.video.stamps import REPEATED_SHARE, each_times, repeats
 
@@ -163,10 +164,12 @@ def without_copies(
       lines: of the rows in the file.
     """
     found = places.copy()
-    for body, axis, row in np.argwhere(np.diff(places, axis=-1) == 0):
-        copy = _copied(clock, places[body, axis], int(row), MANY_DIGITS * resolution[axis])
-        if copy is not None:
-            found[body, :, copy] = np.nan
+    for body, axis in np.ndindex(places.shape[:2]):
+        values = places[body, axis]
+        for pair in stretches(np.diff(values) == 0):
+            run = np.arange(pair.start, pair.stop + 1)
+            copies = _copies(clock, values, run, MANY_DIGITS * resolution[axis])
+            found[body][:, copies] = np.nan
     why = "the place of the row beside it, to the last digit, while it moves: a copy, which counts"
     return found, _unseen(places, found, lines, why)
 
@@ -208,19 +211,26 @@ def _unseen(places: np.ndarray, found: np.ndarray, lines: Sequence[int], why: st
     return [f"{listed}: {why} as not seen"] if rows.size else []
 
 
-def _copied(clock: np.ndarray, values: np.ndarray, row: int, least: float) -> int | None:
-    """Which of two equal rows is a copy of the other; None where neither is."""
-    after, before = np.arange(row + 2, row + 5), np.arange(row - 3, row)
-    beside = after if after[-1] < len(values) else before
-    if beside[0] < 0 or not np.isfinite(values[beside]).all():
-        return None
-    pair = np.array([row, row + 1])
-    through = np.polyfit(clock[beside] - clock[row], values[beside], 2)
-    at = clock[pair] - clock[row]
-    off = np.abs(np.polyval(through, at) - values[pair])
+def _copies(clock: np.ndarray, values: np.ndarray, run: np.ndarray, least: float) -> np.ndarray:
+    """Which of rows that are equal are copies of another of them; none where nothing tells."""
+    none, last = run[:0], len(values) - 1
+    after, before = run[-1] + np.arange(1, 4), run[0] - np.arange(3, 0, -1)
+    if len(run) > 2:
+        beside = np.concatenate([before, after])
+    else:
+        beside = after if after[-1] <= last else before
+    if beside[0] < 0 or beside[-1] > last or not np.isfinite(values[beside]).all():
+        return none
+    through = np.polyfit(clock[beside] - clock[run[0]], values[beside], 2)
+    at = clock[run] - clock[run[0]]
+    off = np.abs(np.polyval(through, at) - values[run])
     speed = abs(float(np.polyval(np.polyder(through), at[off.argmin()])))
-    step = float(np.abs(np.diff(values[beside])).min())
+    steps = np.abs(np.diff(values[beside]))
+    step = float(steps[np.diff(beside) == 1].min())
     is_moving = step > least and speed * at[1] > GOES_ON * step
-    if not is_moving or off.max() < COPY * step or off.min() > PLACE * step:
-        return None
-    return int(pair[off.argmax()])
+    others = np.delete(off, off.argmin())
+    misses = np.abs(np.polyval(through, clock[beside] - clock[run[0]]) - values[beside]).max()
+    is_told = is_moving and max(misses, off.min()) <= PLACE * step
+    if not is_told or others.min() < COPY * step:
+        return none
+    return np.delete(run, off.argmin())

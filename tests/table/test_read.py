@@ -688,7 +688,7 @@ def _falling(copies: dict[int, int], digits: int, folder: Path) -> TrackTable:
     return read_table(path)
 
 
-@pytest.mark.parametrize("copies", [{0: 1}, {29: 28}, {0: 1, 29: 28}, {11: 10}])
+@pytest.mark.parametrize("copies", [{0: 1}, {29: 28}, {0: 1, 29: 28}, {11: 10}, {5: 4, 6: 4, 7: 4}])
 def test_a_copied_place_is_not_seen(copies, tmp_path: Path) -> None:
     """At either end, as of programs that lose a body or find it late, and in a gap."""
     table = _falling(copies, 9, tmp_path)
@@ -705,6 +705,10 @@ def test_equal_places_are_no_copies_where_a_path_turns_or_digits_are_few(tmp_pat
     rows = "\n".join(f"{a:.4f},{1.5 * a:.9f},0" for a in t)
     path.write_text(f"t (s),x (m),y (m)\n{rows}\n")
     assert np.isfinite(read_table(path).position).all()  # it moves along x alone
+    rests = np.clip(np.abs(t) - 0.1, 0.0, None) * np.sign(t)
+    rows = "\n".join(f"{a:.4f},{b:.9f}" for a, b in zip(t, rests, strict=True))
+    path.write_text(f"t (s),x (m)\n{rows}\n")
+    assert np.isfinite(read_table(path).position).all()  # it lies still for a while
     for moment in np.linspace(0.0, 0.09, 10):  # it is let go
         fallen = 2.0 - 4.905 * np.maximum(t - t[0] - moment, 0.0) ** 2
         rows = "\n".join(f"{a:.4f},{b:.9f}" for a, b in zip(t, fallen, strict=True))
