@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from galileo_jax.api.questions import check_answered, questions
+from galileo_jax.api.questions import assumed, check_answered
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
@@ -88,9 +88,8 @@ def yaml_of(known: Understood, answers: Answers) -> str:
     said = {key: value for key, value in answers.items() if key not in ("points", "scenario")}
     if needs_angle(scenario):
         said.setdefault("ramp_angle_deg", None)
-    for one in questions(known, answers):
-        if one.key == "track_units" and not one.is_open:  # its motion says it
-            said["track_units"] = one.default
+    for key, one in assumed(known, answers).items():
+        said[key] = f"{one.default}  # {one.why}"
     return _filled(text, said)
 
 

@@ -76,6 +76,12 @@ def answered(known: Understood, typed: Mapping[str, str]) -> Answered:
     return Answered(tuple(asked.values()), answers, problems)
 
 
+def assumed(known: Understood, answers: Answers) -> dict[str, Question]:
+    """By keys, the questions that nobody answered, and that the motion itself answers."""
+    asked = questions(known, answers)
+    return {one.key: one for one in asked if one.key == "track_units" and not one.is_open}
+
+
 def check_answered(known: Understood, answers: Answers) -> None:
     """Raises `InputError`, one line with all that is missing, where only a person can say."""
     missing = [one for one in questions(known, answers) if one.is_open]
@@ -178,7 +184,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
         return None
     text, choices = "In which unit are its lengths?", (*METRES_PER_UNIT, "px")
     unit, size = _unit_by_gravity(known, answers), max(seen.moved)
-    why = f"it falls as free fall does in {unit}"
+    why = f"it falls as free fall does in {unit}, so that gravity is no measurement"
     if is_open := unit is None:
         unit = "px" if size >= 50 else "m" if size <= 20 else "cm"
         why = f"the table does not say; the way is {size:.4g} long"

@@ -222,6 +222,7 @@ def show(picture: Path) -> None:
 def _write(known: "Understood", answers: dict[str, Any]) -> None:
     """Writes a yaml that is not there; says what one that is there lacks."""
     from galileo_jax.api.proposed_clip import write_yaml
+    from galileo_jax.api.questions import assumed
 
     try:
         written = write_yaml(known, answers)
@@ -230,6 +231,8 @@ def _write(known: "Understood", answers: dict[str, Any]) -> None:
         return
     if written is not None:
         command.say(f"{written}: written; the next call asks nothing")
+        for key, one in assumed(known, answers).items():
+            command.say(f"warning: {written}: {key}: {one.default} is taken, as {one.why}")
         return
     lacks = {key: v for key, v in answers.items() if key not in (*known.declared, "points")}
     if lacks:
