@@ -214,7 +214,12 @@ def chi2_text(error: Mapping[str, Any]) -> str:
 
 
 def error_text(error: Mapping[str, Any]) -> str:
-    """What the fit leaves, as numbers: chi2, and the velocity error beside that of noise."""
+    """What the fit leaves, as numbers: chi2, and the velocity error beside that of noise.
+
+    No two frames that follow each other may be seen; then there is no velocity.
+    """
+    if not (error["rmse"] is not None and math.isfinite(error["rmse"])):
+        return chi2_text(error)
     return (
         f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
         f"{error['noise']:.4f})"

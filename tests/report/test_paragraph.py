@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from galileo_jax.report.fit_text import distance_text, imperfection_text
+from galileo_jax.report.fit_text import distance_text, error_text, imperfection_text
 from galileo_jax.report.paragraph import paragraph
 
 ERROR = {"rms_mm": 0.81, "rms_percent_of_way": 0.21, "chi2_per_dof": 1.0}
@@ -235,3 +235,10 @@ def test_an_error_of_the_marks_far_below_what_is_left_is_not_told(size_m, is_tol
     sizes = {"mean": size_m, "q025": 0.8 * size_m, "q975": 1.2 * size_m, "unit": "m"}
     found = {"lasting_error": {**sizes, "ordinary": True, "meaning": "the marks are off by {size}"}}
     assert bool(imperfection_text(found, {"rms_mm": 5.0})) == is_told
+
+
+@pytest.mark.parametrize("rmse", [None, float("nan")])
+def test_where_no_two_frames_follow_each_other_there_is_no_velocity(rmse) -> None:
+    error = {"chi2_per_dof": 1.0, "rmse": rmse, "noise": rmse}
+    assert error_text(error) == "chi2 per degree of freedom 1.00"
+    assert "velocity error 0.0100 m/s" in error_text(error | {"rmse": 0.01, "noise": 0.02})
