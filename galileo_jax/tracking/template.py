@@ -1,6 +1,6 @@
 """An object's template: its patch, the region that belongs to it, and its smeared versions."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import cv2
@@ -15,9 +15,11 @@ is a few percent off, and is what another object touches."""
 RIM_SHARE = 1.4
 """Of its size: up to where a plain object is compared, its edge against what is behind."""
 PLAIN = 2.0e3
-"""Texture (see `template_at`) below which an object counts as plain: with a noise of five grey
+"""Texture (see `is_plain`) below which an object counts as plain: with a noise of five grey
 levels its place would be known to 0.1 px only."""
-WINDOW_PX = 21  # side of the region of unknown size: the object and some of what is around it
+WINDOW_PX = 21.0  # side of the region of unknown size: the object and some of what is around it
+WINDOWS_PX = (WINDOW_PX, 2 * WINDOW_PX, 4 * WINDOW_PX)
+"""The first that has texture is taken: the middle of a plain object has none, but its edge."""
 ALWAYS = 0.99  # of the exposure that the object covers a pixel that is compared
 MIN_REGION_SHARE = 0.3  # of the sharp region that a smeared one keeps at least
 
@@ -88,19 +90,25 @@ class Template:
 def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
     """The template of the object at `point_px` in the grey `image`."""
 
-    def cut(share: float) -> Template:
-        region = region_of(outline, share)
+    def cut(size_px: tuple[float, float], share: float) -> Template:
+        region = region_of(replace(outline, size_px=size_px), share)
         patch = patch_at(image, np.array([*point_px, 0.0]), region.shape[0] // 2)
         return Template(patch, region)
 
-    if outline.size_px is None:
-        outline = Outline((WINDOW_PX, WINDOW_PX), outline.angle_rad)
-        return cut(1.0)
-    core = cut(CORE_SHARE)
-    # The smaller eigenvalue of the summed structure tensor, grey levels^2 (Shi, Tomasi 1994): the
-    # variance of the place is the noise's variance divided by it.
-    texture = float(np.linalg.eigvalsh(core.sharp(FINE_PX).normal[:2, :2])[0])
-    return core if texture >= PLAIN else cut(RIM_SHARE)
+    if outline.size_px is not None:
+        core = cut(outline.size_px, CORE_SHARE)
+        return cut(outline.size_px, RIM_SHARE) if is_plain(core) else core
+    tried = (cut((side, side), 1.0) for side in WINDOWS_PX)
+    return next((one for one in tried if not is_plain(one)), cut((WINDOW_PX, WINDOW_PX), 1.0))
+
+
+def is_plain(template: Template) -> bool:
+    """Whether a template has so little texture that its place is hardly known.
+
+    By the smaller eigenvalue of the summed structure tensor, grey levels^2 (Shi, Tomasi 1994): the
+    variance of the place is the noise's variance divided by it.
+    """
+    return float(np.linalg.eigvalsh(template.sharp(FINE_PX).normal[:2, :2])[0]) < PLAIN
 
 
 def region_of(outline: Outline, share: float) -> np.ndarray:

@@ -61,6 +61,16 @@ class Labelled(Box):
         return drawn
 
 
+@dataclass(frozen=True)
+class Plain(Box):
+    """A box of one grey."""
+
+    size_px: tuple[int, int] = (38, 26)
+
+    def texture(self) -> np.ndarray:
+        return np.full((FINE * self.size_px[1], FINE * self.size_px[0]), 60, np.float32)
+
+
 def scene(size_px: tuple[int, int], seed: int = 9) -> np.ndarray:
     """A quiet background, at the fine resolution, `[height, width]` float32."""
     rng = np.random.default_rng(seed)

@@ -7,7 +7,7 @@ from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.template import Outline, grey, template_at
 from galileo_jax.tracking.tracker import Start, track_video
-from tests.tracking.moving_box import Box, Ringed, film, slide
+from tests.tracking.moving_box import Box, Plain, Ringed, film, slide
 
 pytestmark = pytest.mark.video
 
@@ -161,6 +161,21 @@ def test_plain_disc_is_followed_without_a_turn():
     assert track.is_visible.all()
     assert np.abs(errors(track, path)).max() < 0.1
     assert np.abs(track.angle_rad).max() < 1e-5
+
+
+@pytest.mark.parametrize("off_px", [(0, 0), (4, -2), (-5, 1), (2, 2)])
+def test_wherever_a_plain_box_is_marked_it_is_followed(off_px):
+    """Around a point in its middle there is nothing to see."""
+    n = np.arange(20)
+    path = np.stack([40 + 0.35 * n**2, 40 + 0.1 * n**2, 0.0 * n], axis=1)
+    place = path[0, :2] + off_px
+    track = track_video(
+        lambda: iter(film([(Plain(), path)])),
+        [Start("box", (float(place[0]), float(place[1])), Outline(None))],
+        n / FPS,
+    )
+    assert track.is_visible.all()
+    assert np.abs(errors(track, path) - off_px).max() < 1.0
 
 
 def struck(frames=16, speed=14.0, after=3.0, hit=7):
