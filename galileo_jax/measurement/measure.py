@@ -169,10 +169,9 @@ def measure(clip: Clip) -> Measurement:
     segments = segment(clip, whole, pixels)
     # A track that goes astray tells nothing of the clock.
     observation = segments.used(whole)
-    doubt = None
-    if not segments.astray:
+    doubt = path_doubt(clip, observation)
+    if doubt is None and not segments.astray:
         doubt = frame_rate_doubt(clip, whole) or speed_doubt(clip, observation)
-    doubt = doubt or path_doubt(clip, observation)
     told.say(*map(str, segments.cuts))
     clip = _moving(clip, observation, segments, told)
     if scenario.is_level or clip.scenario == "toss":

@@ -147,7 +147,8 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
             return None
         return (
             f"{clip.path}: {name} goes across by {abs(across):.3g} m and down by {-up:.3g} m, and "
-            "what falls goes down: is it the thing that is meant (`--point X Y`)?"
+            "what falls goes down: mark the thing that is meant (`--point X Y`), or turn the film "
+            "if its camera lay on its side"
         )
     likely = likely_in_plane(*place)
     if likely.scenario not in ("incline", "fall") or not likely.is_clear:
