@@ -9,6 +9,8 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
+from tests.tracking.moving_box import Box, film
+from tests.video.make_video import write_film
 
 K1, NOISE_M, G = 0.2, 3e-4, 9.81
 
@@ -52,6 +54,12 @@ def test_what_k1_is_with_the_other_angle(tmp_path):
     other = math.tan(b) - (math.sin(a) - K1 * math.cos(a)) / math.cos(b)
     (said,) = (line for line in found.warnings if "if the board falls by 32.0 degrees" in line)
     assert float(said.rsplit(" ", 1)[1]) == pytest.approx(other, abs=0.003)
+
+
+def test_an_angle_that_is_fitted_is_no_other_angle(tmp_path):
+    found = gx.fit(slide(tmp_path, path_deg=28.0, true_deg=28.0), effects=["ramp_angle"])
+    assert abs(found.parameters["ramp_angle"]["mean"] - math.radians(3)) < 0.01
+    assert not any("if the board falls" in line for line in found.warnings)
 
 
 @pytest.mark.parametrize(("path_deg", "is_said"), [(25.3, False), (26.0, False), (28.0, True)])
@@ -166,3 +174,17 @@ def test_a_spring_on_a_level_track(tmp_path):
     assert found.parameters["period"]["mean"] == pytest.approx(1.0, abs=0.001)
     (said,) = (line for line in found.warnings if "not straight down" in line)
     assert "object1 swings along a line that" in said and "turned" not in said
+
+
+@pytest.mark.video
+def test_what_falls_across_is_said_before_its_gravity(tmp_path):
+    """No clock and no scale explains that: it is another thing, or a camera on its side."""
+    t = np.arange(30) / 60
+    path = np.stack([30 + 700 * t**2, 60 + 0 * t, 0 * t], axis=1)
+    write_film(tmp_path / "a.mp4", film([(Box((16, 16)), path)]), fps=60, options={"crf": "10"})
+    (tmp_path / "a.yaml").write_text(
+        "video: a.mp4\nscenario: fall\nfps: 60\npixels_per_metre: 100\n"
+        "objects: [{name: object1, shape: box, point_px: [30, 60]}]\n"
+    )
+    said = measure(load_clip(tmp_path / "a.yaml")).impossible
+    assert said is not None and said.startswith("object1 goes across by")
