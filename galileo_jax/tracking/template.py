@@ -1,6 +1,6 @@
 """An object's template: its patch, the region that belongs to it, and its smeared versions."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -90,16 +90,16 @@ class Template:
 def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
     """The template of the object at `point_px` in the grey `image`."""
 
-    def cut(size_px: tuple[float, float], share: float) -> Template:
-        region = region_of(replace(outline, size_px=size_px), share)
+    def cut(outline: Outline, share: float) -> Template:
+        region = region_of(outline, share)
         patch = patch_at(image, np.array([*point_px, 0.0]), region.shape[0] // 2)
         return Template(patch, region)
 
     if outline.size_px is not None:
-        core = cut(outline.size_px, CORE_SHARE)
-        return cut(outline.size_px, RIM_SHARE) if is_plain(core) else core
-    tried = (cut((side, side), 1.0) for side in WINDOWS_PX)
-    return next((one for one in tried if not is_plain(one)), cut((WINDOW_PX, WINDOW_PX), 1.0))
+        core = cut(outline, CORE_SHARE)
+        return cut(outline, RIM_SHARE) if is_plain(core) else core
+    windows = [cut(Outline((side, side), outline.angle_rad), 1.0) for side in WINDOWS_PX]
+    return next((one for one in windows if not is_plain(one)), windows[0])
 
 
 def is_plain(template: Template) -> bool:
