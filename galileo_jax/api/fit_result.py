@@ -344,9 +344,8 @@ def make_fit(
     if scarce := [one.no_verdict for one in measurements if one.no_verdict]:
         result["no_verdict"] = "; ".join(scarce)
     friction = result["parameters"].get("k1", {}).get("mean")
-    is_free = "ramp_angle" in result["parameters"]  # then it is the fit's own angle
-    others = [] if is_free else [with_other_angle(one, friction) for one in measurements]
-    if others := [text for text in others if text]:
+    at_declared = None if "ramp_angle" in result["parameters"] else friction
+    if others := [text for one in measurements if (text := with_other_angle(one, at_declared))]:
         result["warnings"] = [*result.get("warnings", []), *others]
     if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = taken

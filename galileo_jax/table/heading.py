@@ -8,7 +8,7 @@ t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise
+from itertools import chain, pairwise, permutations
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
@@ -124,40 +124,43 @@ def one_below_the_other(heading: Heading) -> Heading:
     a colon, or their times differ; columns of named bodies only if no clock goes on in another.
     """
     used = [n for n, title in enumerate(heading.titles) if title]
-    plain = [_plain(heading, n) for n in used]
-    may_be = (n for n in range(2, len(plain) // 2 + 1) if len(plain) % n == 0)
-    width = next((n for n in may_be if plain == plain[:n] * (len(plain) // n)), 0)
-    own = [replace(heading.meanings[n], name="") for n in used[:width]]
+    parted = [_parted(heading.titles[n]) for n in used]  # data set and words
+    kinds = [_kind(heading.meanings[n], one) for n, (_, one) in zip(used, parted, strict=True)]
+    may_be = (n for n in range(2, len(kinds) // 2 + 1) if len(kinds) % n == 0)
+    width = next((n for n in may_be if kinds == kinds[:n] * (len(kinds) // n)), 0)
+    own = tuple(replace(heading.meanings[n], name="") for n in used[:width])
     clock = next((n for n, one in enumerate(own) if one.role == "time"), None)
     if clock is None:
         return heading
     blocks = [used[n : n + width] for n in range(0, len(used), width)]
-    rows = [
-        [[row[n] if n < len(row) else "" for n in block] for _, row in heading.body]
+    each = [
+        [
+            (line, cells)
+            for line, row in heading.body
+            if any(cells := [row[n] if n < len(row) else "" for n in block])
+        ]
         for block in blocks
     ]
-    each = [
-        [(line, cells) for (line, _), cells in zip(heading.body, block, strict=True) if any(cells)]
-        for block in rows
-    ]
     times = [[cells[clock] for _, cells in block] for block in each]
-    is_set = len({heading.titles[n].rpartition(":")[0] for n in used}) == len(blocks)
     if any(heading.meanings[n].name for n in used):
-        apart = (set(one) - set(other) for one in times for other in times if one is not other)
-        is_run = all(apart)
+        is_run = all(set(one) - set(other) for one, other in permutations(times, 2))
     else:
-        is_run = is_set or times != times[:1] * len(blocks)
+        is_run = len({one for one, _ in parted}) == len(blocks) or times != times[:1] * len(blocks)
     if not is_run:
         return heading
-    titles = tuple(heading.titles[n].rpartition(":")[2].strip() for n in used[:width])
-    return replace(heading, titles=titles, meanings=tuple(own), body=[*chain(*each)])
+    titles = tuple(words for _, words in parted[:width])
+    return replace(heading, titles=titles, meanings=own, body=[*chain(*each)])
 
 
-def _plain(heading: Heading, n: int) -> tuple[str, str | None]:
-    """What a column means, whichever run it is of: its role, or its words; and its unit."""
-    meaning = heading.meanings[n]
-    words = heading.titles[n].rpartition(":")[2].strip(" 0123456789").lower()
-    return meaning.role or words, meaning.unit
+def _parted(title: str) -> tuple[str, str]:
+    """The data set's name, before a colon, and the rest of a title."""
+    data_set, _, rest = title.rpartition(":")
+    return data_set, rest.strip()
+
+
+def _kind(meaning: Title, words: str) -> tuple[str, str | None]:
+    """What a column is, whichever run it is of: its role, or else its words; and its unit."""
+    return meaning.role or words.strip(" 0123456789").lower(), meaning.unit
 
 
 def _has_row_names(titles: list[str], body: Rows) -> bool:
@@ -243,7 +246,7 @@ def _listed_titles(above: Rows, width: int) -> Rows:
             runs.append((part[-1][0], [row[0] for _, row in part]))
     titles = next((run for run in runs if _num_titles(run[1]) > 1), None)
     units = next((run for run in runs if _is_units(run[1])), None)
-    return [run for run in (titles, units) if run is not None and titles is not None]
+    return [] if titles is None else [run for run in (titles, units) if run is not None]
 
 
 def _first_titles_below(rows: Rows, n: int) -> bool:

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.numerics.runs import stretches
 from galileo_jax.table.clock import COMMON_FPS
 from galileo_jax.video.stamps import REPEATED_SHARE, each_times, repeats
@@ -221,16 +222,14 @@ def _copies(clock: np.ndarray, values: np.ndarray, run: np.ndarray, least: float
         beside = after if after[-1] <= last else before
     if beside[0] < 0 or beside[-1] > last or not np.isfinite(values[beside]).all():
         return none
-    through = np.polyfit(clock[beside] - clock[run[0]], values[beside], 2)
+    fit = polynomial(clock[beside] - clock[run[0]], values[beside], 2)
     at = clock[run] - clock[run[0]]
-    off = np.abs(np.polyval(through, at) - values[run])
-    speed = abs(float(np.polyval(np.polyder(through), at[off.argmin()])))
+    off = np.abs(np.polyval(fit.solution, at) - values[run])
+    speed = abs(float(np.polyval(np.polyder(fit.solution), at[off.argmin()])))
     steps = np.abs(np.diff(values[beside]))
     step = float(steps[np.diff(beside) == 1].min())
     is_moving = step > least and speed * at[1] > GOES_ON * step
-    others = np.delete(off, off.argmin())
-    misses = np.abs(np.polyval(through, clock[beside] - clock[run[0]]) - values[beside]).max()
-    is_told = is_moving and max(misses, off.min()) <= PLACE * step
-    if not is_told or others.min() < COPY * step:
+    is_told = is_moving and max(off.min(), np.abs(fit.left).max()) <= PLACE * step
+    if not is_told or np.delete(off, off.argmin()).min() < COPY * step:
         return none
     return np.delete(run, off.argmin())
