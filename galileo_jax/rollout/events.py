@@ -7,7 +7,7 @@ right derivatives, whatever the steps.
 """
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import jax
@@ -159,22 +159,61 @@ def step_by_events(
     return jax.lax.while_loop(is_left, phase, (state, whole_s, 0))[0]
 
 
+class Tableau(NamedTuple):
+    """An explicit Runge-Kutta method, after Butcher."""
+
+    nodes: tuple[float, ...]  # `[stage]`, of the step
+    stages: tuple[tuple[float, ...], ...]  # for each stage its weights of the rates before
+    weights: tuple[float, ...]  # `[stage]`
+
+
+CLASSICAL = Tableau(
+    (0.0, 1 / 2, 1 / 2, 1.0),
+    ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
+    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+)
+"""Of fourth order (Kutta, 1901)."""
+DORMAND_PRINCE = Tableau(
+    (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0),
+    (
+        (),
+        (1 / 5,),
+        (3 / 40, 9 / 40),
+        (44 / 45, -56 / 15, 32 / 9),
+        (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+        (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    ),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+"""Of fifth order (Dormand and Prince, 1980, 10.1016/0771-050X(80)90013-3)."""
+
+
 def runge_kutta(
-    rate: Callable[[State, Any], State], state: State, time_s: Any, step_s: Any
+    rate: Callable[[State, Any], State],
+    state: State,
+    time_s: Any,
+    step_s: Any,
+    method: Tableau = CLASSICAL,
 ) -> State:
-    """The state after one step of the classical fourth-order method; `rate` of state and time."""
+    """The state after one step of a Runge-Kutta method; `rate` of state and time."""
+    rates: list[State] = []
 
-    def moved(by: State, spent_s: Any) -> State:
-        return jax.tree.map(lambda value, change: value + spent_s * change, state, by)
+    def moved(weights: Sequence[float]) -> State:
+        used = [(weight, own) for weight, own in zip(weights, rates, strict=True) if weight]
+        if not used:
+            return state
+        weights, changes = zip(*used, strict=True)
 
-    first = rate(state, time_s)
-    second = rate(moved(first, 0.5 * step_s), time_s + 0.5 * step_s)
-    third = rate(moved(second, 0.5 * step_s), time_s + 0.5 * step_s)
-    fourth = rate(moved(third, step_s), time_s + step_s)
-    mean = jax.tree.map(
-        lambda a, b, c, d: (a + 2 * b + 2 * c + d) / 6, first, second, third, fourth
-    )
-    return moved(mean, step_s)
+        def leaf(value: Any, *changes: Any) -> Any:
+            return value + step_s * sum(
+                w * change for w, change in zip(weights, changes, strict=True)
+            )
+
+        return jax.tree.map(leaf, state, *changes)
+
+    for node, weights in zip(method.nodes, method.stages, strict=True):
+        rates.append(rate(moved(weights), time_s + node * step_s))
+    return moved(method.weights)
 
 
 def reaches_s(distance: Any, v: Any, a: Any) -> Any:

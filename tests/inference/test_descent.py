@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join
+from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join, secants
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Sides, Slopes, cost
@@ -95,6 +95,50 @@ def test_steps_follow_a_valley_that_bends(steepness):
         np.testing.assert_allclose(found.best.z[0, 1], found.best.z[0, 0] ** 2, atol=1e-2)
         steps.append(found.num_steps)
     assert found.is_settled.all() and steps[0] < 0.6 * steps[1]
+
+
+class Misfit(Banana):
+    """Residuals that stay large, 20 (z + 1, 0.9 z^2 + z - 1): by J^T J steps shrink to 0.9 each.
+
+    Source: K. Madsen, H. B. Nielsen, O. Tingleff, Methods for non-linear least squares problems
+    (2004), example 3.4.
+    """
+
+    def whites_of(self, points: Batch, motions):
+        z = motions[0][0][:, 0]
+        return [20 * np.stack([z + 1, 0.9 * z**2 + z - 1], axis=1)]
+
+    def slopes(self, points: Batch, steps: np.ndarray, sides: Sides, motions=None) -> Slopes:
+        z = points.z
+        jacobian = np.zeros((len(z), 2, 3))
+        jacobian[:, 0, 0], jacobian[:, 1, 0] = 20, 20 * (1.8 * z[:, 0] + 1)
+        index = np.tile(np.arange(3), (len(z), 1))
+        return Slopes([jacobian], self.whites_of(points, [(z, z, z)]), index, 3)
+
+
+def test_where_much_is_left_steps_know_the_curvature():
+    steps = []
+    for is_smooth in (True, False):
+        descent = Descent(Misfit(), np.ones(3), is_smooth, "ahead")  # pyright: ignore
+        found = descent(batch([0.8, 0.5, 0.5], [0.4, 1.0, 0.0]), 1e-9, 500)
+        assert found.is_settled.all()
+        np.testing.assert_allclose(found.best.z, 0.0, atol=1e-3)
+        steps.append(found.num_steps)
+    assert steps[0] < 0.4 * steps[1]
+
+
+def test_secants_are_the_least_change_that_tells_the_last_step():
+    rng = np.random.default_rng(0)
+    second = rng.standard_normal((5, 3, 3))
+    second += np.swapaxes(second, 1, 2)
+    step, turned, change = rng.standard_normal((3, 5, 3))
+    change *= np.sign(np.sum(change * step, axis=1))[:, None]
+    change[4] *= -1  # the cost bends downwards there
+    found = secants(second, step, turned, change)
+    np.testing.assert_allclose(found, np.swapaxes(found, 1, 2), atol=1e-12)
+    told = np.einsum("pij,pj->pi", found, step)
+    np.testing.assert_allclose(told[:4], turned[:4], atol=1e-10)
+    np.testing.assert_array_equal(found[4], second[4])
 
 
 def test_costs_never_rise_with_more_steps():

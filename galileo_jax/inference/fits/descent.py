@@ -13,8 +13,13 @@ along it tells the residuals' second derivative r'' in its direction, and it end
 
 beside. Forty-four steps along a valley (friction and wheels) become five.
 
+Where much is left that the model cannot explain, J^T J + 1 is not the curvature of the cost: what
+it lacks, S = sum_i r_i r_i'', is learned from how slopes change from step to step (`secants`).
+
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983; M. K.
-Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv 1201.5885.
+Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv 1201.5885; J. E.
+Dennis, D. M. Gay, R. E. Welsch, An adaptive nonlinear least-squares algorithm, ACM TOMS 7 (1981)
+348, 10.1145/355958.355965.
 """
 
 from dataclasses import dataclass
@@ -102,11 +107,17 @@ def in_valley(best: Quadratic, first: int, others: np.ndarray) -> np.ndarray:
 
 
 def _proposals(
-    region: np.ndarray, is_first: np.ndarray, here: Quadratic, there: Quadratic
+    region: np.ndarray,
+    is_first: np.ndarray,
+    here: Quadratic,
+    there: Quadratic,
+    before: np.ndarray,
+    now: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     """As `propose`, which is compiled for few numbers of parameters: those added stay at 0."""
     size = here.z.shape[1]
     more = rounded_up(size, PARAMETERS) - size
+    before, now = (np.pad(beside, [(0, 0), (0, more), (0, more)]) for beside in (before, now))
 
     def wider(one: Quadratic) -> Quadratic:
         z, gradient = (np.pad(rows, [(0, 0), (0, more)]) for rows in (one.z, one.gradient))
@@ -116,9 +127,63 @@ def _proposals(
 
     alone = one_at_a_time(propose)
     region, accepts, step, promised = in_chunks(
-        POINTS, alone, region, is_first, wider(here), wider(there)
+        POINTS, alone, region, is_first, wider(here), wider(there), before, now
     )
     return region, accepts, step[:, :size], promised
+
+
+def secants(
+    second: Float[np.ndarray, "point parameter parameter"],
+    step: Float[np.ndarray, "point parameter"],
+    turned: Float[np.ndarray, "point parameter"],
+    change: Float[np.ndarray, "point parameter"],
+) -> Float[np.ndarray, "point parameter parameter"]:
+    """S = sum_i r_i r_i'' after a step: the least change of it with S step = turned.
+
+        S + (d y^T + y d^T) / (y^T step) - (d^T step) y y^T / (y^T step)^2,  d = turned - S step
+
+    As it was where the cost does not bend upwards along the step (y^T step <= 0).
+
+    Args:
+      second: before; made smaller where residuals became so.
+      step: of the parameters, z.
+      turned: (J_there - J_here)^T r_there.
+      change: of the cost's gradient, y.
+    """
+
+    def along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        return np.einsum("pi,pi->p", one, other)
+
+    bent, expected = along(step, turned), np.einsum("pi,pij,pj->p", step, second, step)
+    is_too_large = np.abs(expected) > np.abs(bent)
+    size = np.divide(bent, expected, out=np.ones(len(step)), where=is_too_large)
+    sized = np.abs(size)[:, None, None] * second
+    up = along(change, step)
+    y = np.divide(change, up[:, None], out=np.zeros_like(change), where=up[:, None] > 0)
+    off = turned - np.einsum("pij,pj->pi", sized, step)
+    both = np.einsum("pi,pj->pij", off, y)
+    twice = along(off, step)[:, None, None] * np.einsum("pi,pj->pij", y, y)
+    found = sized + both + np.swapaxes(both, 1, 2) - twice
+    is_known = (up > 0) & np.isfinite(found).all(axis=(1, 2))
+    return np.where(is_known[:, None, None], found, second)
+
+
+def _tells_better(
+    own: Quadratic, new: Quadratic, bends: np.ndarray, second: np.ndarray
+) -> np.ndarray:
+    """Whether what a step brought would have been told better with S beside J^T J, `[point]`."""
+    step = new.z - bends - own.z
+    straight = own.cost + np.sum(own.gradient * step, axis=1)
+    normal, beside = (np.einsum("pi,pij,pj->p", step, m, step) / 2 for m in (own.normal, second))
+    off = new.cost - straight - normal
+    return np.abs(off - beside) < np.abs(off)
+
+
+def _is_convex(curvature: Float[np.ndarray, "point parameter parameter"]) -> np.ndarray:
+    """Of which points the cost bends upwards in every direction, `[point]`."""
+    is_finite = np.isfinite(curvature).all(axis=(1, 2))
+    known = np.where(is_finite[:, None, None], curvature, 0.0)
+    return is_finite & (np.linalg.eigvalsh(known)[:, 0] > 0)
 
 
 def _bends(
@@ -205,15 +270,27 @@ class Descent:
         region, promised, first_cost = np.ones(count), np.full(count, np.inf), best.cost
         active, num_steps, joined = np.arange(count), 0, np.arange(count)
         slopes, bends = self.residuals.no_slopes(points.free), np.zeros((count, size))
+        second, used = np.zeros((2, count, size, size))  # S, and what of it steps are made with
         while active.size and num_steps < max_steps:
             there = points.take(active)._replace(z=proposed[active])
             own = Quadratic(*(leaf[active] for leaf in best))
             new, better, found = self._quadratic(there, own, widths, active)
             is_first = np.full(len(active), num_steps == 0)
+            beside = second[active]
+            if self.is_smooth and num_steps:
+                is_better = _tells_better(own, new, bends[active], beside)
+                rows = active[better]
+                second[rows] = self._secants(
+                    beside[better], slopes.take(rows), found, own, new, better
+                )
+                beside = second[active]
+                is_better &= _is_convex(own.normal + beside) & _is_convex(new.normal + beside)
+                beside = np.where(is_better[:, None, None], beside, 0.0)
             straight = new._replace(z=new.z - bends[active])
             region[active], accepts, steps, promised[active] = _proposals(
-                region[active], is_first, own, straight
+                region[active], is_first, own, straight, used[active], beside
             )
+            used[active] = beside
             for leaf, value in zip(best, new, strict=True):
                 leaf[active[accepts]] = value[accepts]
             slopes.put(active[accepts], found, np.flatnonzero(accepts[better]))
@@ -263,6 +340,24 @@ class Descent:
         found = quadratic(slopes, there.z[better])
         new.gradient[better], new.normal[better] = found.gradient, found.normal
         return new, better, slopes
+
+    def _secants(
+        self,
+        second: np.ndarray,
+        here: Slopes,
+        found: Slopes,
+        own: Quadratic,
+        new: Quadratic,
+        rows: np.ndarray,
+    ) -> np.ndarray:
+        """`secants` of proposals `rows` of `own` and `new`; `here`, `found`: slopes of these."""
+        width, turned = found.index.shape[1], np.zeros(found.index.shape)
+        for before, after, white in zip(here.jacobian, found.jacobian, found.white, strict=True):
+            more = np.swapaxes(after - before[:, :, :width], 1, 2)
+            turned += (more @ white[..., None])[..., 0]
+        step = new.z[rows] - own.z[rows]
+        change = new.gradient[rows] - own.gradient[rows]
+        return secants(second, step, found.among_all(turned), change)
 
     def slopes(self, points: Batch, widths: np.ndarray, motions: Motions | None = None) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""

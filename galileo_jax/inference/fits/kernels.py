@@ -86,7 +86,7 @@ def seen_slopes_batch(kind: Kind, theta, index, noise, position, velocity, clip:
 
 
 @trace_cached(num_static=0)
-def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
+def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic, before: Any, now: Any):
     """Whether proposals are accepted, and the next ones: one step of Levenberg-Marquardt.
 
     All of it is optimistix's: its trust region compares what a step was to bring with what it
@@ -97,6 +97,9 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
       is_first: `[point]`, that `there` is no proposal but the start.
       here: the points' costs.
       there: those of the proposals, where these were before they were bent.
+      before: `[point, model parameter, model parameter]`, the curvature beside `normal` with which
+        the proposals were made.
+      now: the same for the next ones.
 
     Returns:
       The next size; `[point]`, whether `there` is accepted; the next steps `[point, model
@@ -108,22 +111,22 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
     trust = optx.ClassicalTrustRegion(high_cutoff=HIGH_CUTOFF)
     descent = optx.DampedNewtonDescent()
 
-    def one(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
-        info = (_function_info(here), _function_info(there))
+    def one(size: Any, is_first: Any, here: Quadratic, there: Quadratic, before: Any, now: Any):
+        info = (_function_info(here, before), _function_info(there))
         region = eqx.tree_at(lambda s: s.step_size, trust.init(here.z, info[0]), size)
         size, accepts, _, _ = trust.step(is_first, here.z, there.z, *info, region)
         best = jax.tree.map(lambda a, b: jnp.where(accepts, b, a), here, there)
-        state = descent.query(best.z, _function_info(best), descent.init(best.z, info[0]))
+        state = descent.query(best.z, _function_info(best, now), descent.init(best.z, info[0]))
         step, _ = descent.step(size, state)
-        promised = -trust.predict_reduction(step, _function_info(best))
+        promised = -trust.predict_reduction(step, _function_info(best, now))
         return size, accepts, step, promised
 
-    return jax.vmap(one)(size, is_first, here, there)
+    return jax.vmap(one)(size, is_first, here, there, before, now)
 
 
-def _function_info(at: Quadratic) -> Any:
+def _function_info(at: Quadratic, beside: Any = 0.0) -> Any:
     import lineax as lx
     import optimistix as optx
 
-    hessian = lx.MatrixLinearOperator(at.normal, lx.positive_semidefinite_tag)
+    hessian = lx.MatrixLinearOperator(at.normal + beside, lx.positive_semidefinite_tag)
     return optx.FunctionInfo.EvalGradHessian(at.cost, at.gradient, hessian)
