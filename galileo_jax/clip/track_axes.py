@@ -173,8 +173,19 @@ def along_line(
         sign = 1 if file.track_y == "up" else -1
     else:
         sign = sign_along(file, times, way_m[0])
+        seen = way_m[0][np.isfinite(way_m[0])]
+        if scenario.up_shows == "sink" and seen[-1] > seen[0]:
+            raise of.wrong_key(rises_or_sinks(of, "the way" if axis == "line" else axis))
     on_line = line_observation(file, of.names, times, sign * way_m, sd_m)
     return replace(on_line, rows_of_noise=len(times))
+
+
+def rises_or_sinks(of: DeclaredTrack, axis: str, usual: str = "up") -> str:
+    """The question of what a liquid's motion does not show; `usual`: which way the axis points."""
+    return (
+        f"track_y: missing; in {of.path.name} it rises if {axis} points {usual}, and sinks if not "
+        "(a depth points down); write track_y: up | down"
+    )
 
 
 def way_alone(of: DeclaredTrack, axis: str) -> tuple[str, ...]:

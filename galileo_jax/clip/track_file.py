@@ -21,6 +21,7 @@ from galileo_jax.clip.track_axes import (
     goes_right,
     in_plane,
     observed_where_finite,
+    rises_or_sinks,
     swung,
     up_from_motion,
     way_alone,
@@ -237,10 +238,7 @@ def _y_axis_of(
     if found == usual or (found is None and (falls_aside or is_level)):
         return usual, ()
     if shows == "sink":
-        raise of.wrong_key(
-            f"track_y: missing; in {of.path.name} it rises if y points {usual}, and sinks if not; "
-            "write track_y: up | down"
-        )
+        raise of.wrong_key(rises_or_sinks(of, "y", usual))
     if found is None:
         raise of.wrong_key(
             f"track_y: missing; {of.path.name} does not state which way its y axis "

@@ -12,6 +12,7 @@ UPSAMPLED_TO_PX = 2.0  # what is smoothed less than this is kept at twice the fr
 PYRAMID_VARIANCE_PX2 = 0.25  # of OpenCV's `pyrUp`, which smooths half pixels by (1 4 6 4 1) / 16
 LINEAR_SHARE = 1 / 6  # of h^2: the variance of linear interpolation between samples h apart
 SAME_SMEAR_PX, MAX_SMEARED = 0.5, 8  # smears alike to this are made once; so many are kept
+MOST_PLACES = 2**14  # in one row of OpenCV's `remap`, which takes less than 2^15
 
 SOME_FRAMES = 15  # evenly over a film, show what stands still in it
 
@@ -97,8 +98,19 @@ class _Window:
         left = self._scale * (place[0] - self._corner[0])
         top = self._scale * (place[1] - self._corner[1])
         x, y = own
-        places_x = (np.float32(c) * x - np.float32(s) * y + np.float32(left))[None]
-        places_y = (np.float32(s) * x + np.float32(c) * y + np.float32(top))[None]
-        return cv2.remap(
-            self._pixels, places_x, places_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )[0]
+        places_x = np.float32(c) * x - np.float32(s) * y + np.float32(left)
+        places_y = np.float32(s) * x + np.float32(c) * y + np.float32(top)
+
+        def of(part: slice) -> np.ndarray:
+            return cv2.remap(
+                self._pixels,
+                places_x[None, part],
+                places_y[None, part],
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )[0]
+
+        if len(x) <= MOST_PLACES:
+            return of(slice(None))
+        begins = range(0, len(x), MOST_PLACES)
+        return np.concatenate([of(slice(begin, begin + MOST_PLACES)) for begin in begins])

@@ -15,6 +15,8 @@ SUDDEN = 0.6  # of what a picture changes by: those before a repeat, and after i
 TURN = 0.9  # of it: what changes by less towards a picture, and by more after it, turns there
 LEAST_CHANGE_GREY = 4.0  # of a block of pixels; less is noise
 FADED = 0.5  # of the usual contrast: paler pictures at either end belong to a fade
+# Of the step before: by more the contrast rises on within a fade, be it even or smooth.
+RISES_ON = 0.25
 AS_DECLARED = 0.02  # a declared rate that is so near the film's confirms the film's own times
 
 
@@ -100,10 +102,23 @@ def _is_sudden(
 
 
 def is_blank(contrast: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:
-    """Which pictures at either end are black, blank or faded, by the sd of their grey levels."""
+    """Which pictures at either end are black, blank or faded, by the sd of their grey levels.
+
+    A film that begins (or ends) so fades in for as long as the contrast rises on.
+    """
     is_full = np.flatnonzero(contrast >= FADED * np.median(contrast))
+    first = _faded_in(contrast, int(is_full[0]))
+    last = len(contrast) - 1 - _faded_in(contrast[::-1], len(contrast) - 1 - int(is_full[-1]))
     index = np.arange(len(contrast))
-    return (index < is_full[0]) | (index > is_full[-1])
+    return (index < first) | (index > last)
+
+
+def _faded_in(contrast: Float[np.ndarray, " picture"], first: int) -> int:
+    """The first picture after a fade, from the first whose contrast is no longer small."""
+    rises = np.diff(contrast)
+    while 0 < first < len(rises) and rises[first] > RISES_ON * rises[first - 1]:
+        first += 1
+    return first
 
 
 def each_times(total: int, kept: int) -> str:

@@ -175,3 +175,15 @@ def test_what_a_track_leaps_to_does_not_hide_which_way_is_up(seed: int, sign: fl
     place = np.stack([np.where(times < 0.42, 0.2, 0.83), sign * height])
     place += np.random.default_rng(seed).normal(0, 1e-3, place.shape)
     assert up_from_motion("bend", times, place) == ("up" if sign > 0 else "down")
+
+
+def test_a_depth_alone_is_asked_whether_it_rises_or_sinks(tmp_path: Path):
+    """What sinks faster and faster, by its depth, would be taken for what rises."""
+    depth = 0.02 + 0.3 * T**2 / (0.2 + T)
+    columns, keys = {"time_s": T, "depth_m": depth + NOISE[0]}, "scenario: liquid"
+    with pytest.raises(InputError, match="track_y: missing; .* rises if the way points up"):
+        observed(tmp_path, columns, keys)
+    down = observed(tmp_path, columns, keys + "\ntrack_y: down")
+    assert down.position_m[0, 1, -1] < down.position_m[0, 1, 0]
+    up = observed(tmp_path, {"time_s": T, "y_m": -depth + NOISE[0]}, keys)
+    assert up.position_m[0, 1, -1] < up.position_m[0, 1, 0]

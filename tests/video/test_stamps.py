@@ -75,6 +75,23 @@ def test_pale_ends() -> None:
     assert np.flatnonzero(is_blank(contrast)).tolist() == [0, 1, 10, 11]
 
 
+@pytest.mark.parametrize("shape", [lambda s: s, lambda s: (1 - np.cos(np.pi * s)) / 2, np.sqrt])
+@pytest.mark.parametrize("num_black", [1, 6])
+def test_a_fade_lasts_until_the_contrast_rises_no_more(shape, num_black):
+    fade = 19 * shape(np.arange(1, 13) / 12)
+    noise = 0.05 * np.random.default_rng(num_black).standard_normal(50)
+    contrast = np.concatenate([np.full(num_black, 0.4), fade, 19 + noise])
+    found = np.flatnonzero(~is_blank(contrast))
+    assert contrast[found].min() > 0.97 * 19 and len(found) >= 50
+    np.testing.assert_array_equal(is_blank(contrast[::-1]), is_blank(contrast)[::-1])
+
+
+def test_a_film_that_begins_at_once_after_black_loses_no_picture():
+    """Though something comes into it, which raises the contrast step by step."""
+    contrast = np.concatenate([np.full(5, 0.4), 19 + 0.5 * np.arange(20)])
+    assert np.flatnonzero(is_blank(contrast)).tolist() == [0, 1, 2, 3, 4]
+
+
 def test_numbers_in_a_line() -> None:
     assert listed(np.array([3])) == "3"
     assert listed(np.arange(3, 10)) == "3 to 9"
