@@ -4,6 +4,7 @@ The way of a film, top to bottom:
 
     tracking       frames -> places in pixels, with errors          (`tracking.clip.track_clip`)
     in_metres      pixels -> places in metres, with errors          (`observed`)
+    off_path       without places beside a path that goes on        (`on_path`)
     infer_*        angle, foot, sizes, scale that the yaml leaves open
     segments       which part of the track is motion of the scene   (`segments.segment`)
     measure        all of it: the `Observation` that a model is compared with
@@ -39,6 +40,7 @@ from galileo_jax.measurement.path_direction import (
     turned_back,
     way_text,
 )
+from galileo_jax.measurement.segments.off_path import on_path
 from galileo_jax.measurement.segments.segments import HELD, Cut, Segments, segment
 from galileo_jax.measurement.segments.start_speed import may_move, on_ramp, rest_s, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
@@ -147,10 +149,12 @@ def measure(clip: Clip) -> Measurement:
     # The object's outline stands along the ramp: a first look, as a disc, tells how steep.
     is_first_look = needs_slope and clip.video is not None
     if scenario.has_ramp and not scenario.has_table and scenario.angle_deg is None:
-        clip = _downhill(clip, observed(_as_discs(clip) if is_first_look else clip)[0], told)
+        clip = _downhill(clip, _seen(_as_discs(clip) if is_first_look else clip), told)
     if is_first_look:
-        clip = _inclined(clip, observed(_as_discs(clip))[0])
+        clip = _inclined(clip, _seen(_as_discs(clip)))
     whole, pixels = observed(clip)
+    whole, said = on_path(whole)
+    told.say(*said)
     if scenario.has_table and not in_pixels and not clip.is_own_track and clip.track_origin is None:
         whole = _from_foot(clip, whole, told)
     tracked = whole
@@ -252,6 +256,11 @@ def _moving(clip: Clip, observation: Observation, segments: Segments, told: _Inf
     return clip if is_declared else moving
 
 
+def _seen(clip: Clip) -> Observation:
+    """For a first look: the clip's track without places beside its path."""
+    return on_path(observed(clip)[0])[0]
+
+
 def _as_discs(clip: Clip, **update: Any) -> Clip:
     """For a first look, which does not know how they stand: the disc that fits into each object."""
     discs = tuple(
@@ -267,7 +276,7 @@ def _with_foot(clip: Clip, told: _Inferring) -> Clip:
     """The clip with the foot of its ramp, from a first look at the path."""
     assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
     about = (0.0, 0.0) if clip.rectangle is None else clip.rectangle.corners_px[0]
-    first_look, _ = observed(_as_discs(clip, origin_px=about))
+    first_look = _seen(_as_discs(clip, origin_px=about))
     x, y = picture_plane(clip, about).to_pixels(infer_foot(clip, first_look))
     origin = (round(float(x), 1), round(float(y), 1))
     # As good as the point that was followed is the object's centre.

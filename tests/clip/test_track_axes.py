@@ -181,7 +181,7 @@ def test_a_depth_alone_is_asked_whether_it_rises_or_sinks(tmp_path: Path):
     """What sinks faster and faster, by its depth, would be taken for what rises."""
     depth = 0.02 + 0.3 * T**2 / (0.2 + T)
     columns, keys = {"time_s": T, "depth_m": depth + NOISE[0]}, "scenario: liquid"
-    with pytest.raises(InputError, match="track_y: missing; .* rises if the way points up"):
+    with pytest.raises(InputError, match=r"track_y: missing; .* rises if the way points up"):
         observed(tmp_path, columns, keys)
     down = observed(tmp_path, columns, keys + "\ntrack_y: down")
     assert down.position_m[0, 1, -1] < down.position_m[0, 1, 0]
