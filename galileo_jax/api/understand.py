@@ -203,7 +203,8 @@ def is_declared(file: str | Path) -> bool:
     scenario = declared.get("scenario")
     if scenario is None or not declared.get("objects"):
         return False
-    if declared.get("video") is not None and "fps" not in declared:
+    is_film = declared.get("track") is None and not is_track(Path(file))
+    if (is_film or declared.get("video") is not None) and "fps" not in declared:
         return False
     is_known = str(scenario) in SCENARIOS
     has_angle = "ramp_angle_deg" in declared

@@ -54,6 +54,8 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     if is_track(path):
         content = {key: value for key, value in content.items() if key != "video"}
         content.setdefault("track", path.name)
+    elif path != yaml_path and content.get("track") is None:
+        content.setdefault("video", path.name)
     clip = check_clip(yaml_path, content | given, overridden=frozenset(given))
     check_belongs(clip, path)
     # Beside a video the same yaml needs what the track does not.

@@ -146,7 +146,7 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
         if abs(across) <= abs(up):  # no camera is turned by more
             return None
         return (
-            f"{clip.path}: {name} goes across by {abs(across):.3g} m and down by {-up:.3g} m, and "
+            f"{clip.path}: {name} goes across by {abs(across):.3g} m, farther than down, and "
             "what falls goes down: mark the thing that is meant (`--point X Y`), or turn the film "
             "if its camera lay on its side"
         )

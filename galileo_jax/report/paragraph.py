@@ -52,6 +52,7 @@ def paragraph(
     is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [
         *(f"Check first: {one}." for one in result.get("impossible", ())),
+        "Until that is settled, what follows is no result." if result.get("impossible") else "",
         _frictions(known, body, shapes),
         *_ratios(known, body),
         _values(rest),

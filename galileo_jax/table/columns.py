@@ -75,7 +75,8 @@ def with_roles(heading: Heading, fps: float | None) -> Columns:
     # What was called a place, or was the only column, may have turned out to be the time.
     if not any(one.role in PLACES for one in columns.meanings):
         columns = _with_places(columns)
-    return _with_labels(_with_likelihoods(_swapped_back(_with_other_axis(columns))))
+    columns = _without_counted_time(_swapped_back(_with_other_axis(columns)))
+    return _with_labels(_with_likelihoods(columns))
 
 
 def _parsed(heading: Heading, which: list[int]) -> dict[int, Numbers]:
@@ -162,6 +163,15 @@ def _with_places(columns: Columns) -> Columns:
     given = dict(zip(free, roles, strict=True))
     taken = (f"{columns.name_of(n)} as {'the way' if r == 'line' else r}" for n, r in given.items())
     return columns.given(given, f"read by order: {', '.join(taken)}")
+
+
+def _without_counted_time(columns: Columns) -> Columns:
+    """The columns without a time that is the number of the frame again: no rate was known there."""
+    times, frames = ([columns.numbers[n].values for n in columns.of(r)] for r in ("time", "frame"))
+    is_counted = bool(times and frames) and np.array_equal(times[0], frames[0], equal_nan=True)
+    if not is_counted or np.unique(times[0]).size < 3:
+        return columns
+    return columns.given({columns.of("time")[0]: ""})
 
 
 def _with_other_axis(columns: Columns) -> Columns:

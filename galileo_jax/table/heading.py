@@ -5,6 +5,7 @@ t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,
 0.0,1.2E-2,-3.0E-3     t,x,y,x,y                    (s);(m);(m)       coords,x,y
 """
 
+import re
 import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_numbe
 from galileo_jax.table.titles import LENGTHS, Title, is_turning, title_of, unit_of
 
 MULTI = "multi:"
+DIGITS = re.compile(r"\s*\d+")  # by which runs are told apart: "s1 (cm)", "s 2 (cm)"
 AXES = ("x", "y", "z")
 RATES = (
     *("frequency", "fps", "frame rate", "framerate", "sampling rate"),
@@ -121,7 +123,8 @@ def one_below_the_other(heading: Heading) -> Heading:
     """Runs that stand side by side, each with its own times, as motions that follow each other.
 
     Their columns mean the same in the same order. They are runs if a data set's name stands before
-    a colon, or their times differ; columns of named bodies only if no clock goes on in another.
+    a colon, or their times differ; columns of named bodies only if no clock goes on in another, or
+    each has one coordinate.
     """
     used = [n for n, title in enumerate(heading.titles) if title]
     parted = [_parted(heading.titles[n]) for n in used]  # data set and words
@@ -143,7 +146,7 @@ def one_below_the_other(heading: Heading) -> Heading:
     ]
     times = [[cells[clock] for _, cells in block] for block in each]
     if any(heading.meanings[n].name for n in used):
-        is_run = all(set(one) - set(other) for one, other in permutations(times, 2))
+        is_run = all(set(one) - set(other) for one, other in permutations(times, 2)) or width == 2
     else:
         is_run = len({one for one, _ in parted}) == len(blocks) or times != times[:1] * len(blocks)
     if not is_run:
@@ -160,7 +163,7 @@ def _parted(title: str) -> tuple[str, str]:
 
 def _kind(meaning: Title, words: str) -> tuple[str, str | None]:
     """What a column is, whichever run it is of: its role, or else its words; and its unit."""
-    return meaning.role or words.strip(" 0123456789").lower(), meaning.unit
+    return meaning.role or DIGITS.sub("", words).lower(), meaning.unit
 
 
 def _has_row_names(titles: list[str], body: Rows) -> bool:

@@ -19,6 +19,7 @@ NOTHING = frozenset(
     (
         *("", "nan", "-nan", "nan(ind)", "na", "n/a", "n.a.", "<na>", "null", "nil", "none"),
         *("#n/a", "#nv", "#value!", "#wert!", "#div/0!", "?", "-", "--", "---"),
+        *("n.d.", "n/d", "nd", "k.a.", "s.d.", "missing", "lost"),
     )
 )
 """What programs write where there is no number, lower case."""

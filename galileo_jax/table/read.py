@@ -242,6 +242,9 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
         if {"x", "y"} & set(of):
             of.pop("line", None)
             of.pop("angle", None)
+    every = [role for of in by_name.values() for role in of]
+    if len(every) == len(by_name) == len(set(every)):  # words beside x and beside y are no names
+        return {"": {role: n for of in by_name.values() for role, n in of.items()}}
     return by_name
 
 

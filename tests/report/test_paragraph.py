@@ -183,7 +183,9 @@ def test_of_several_explanations_the_values_are_those_with_one_of_them():
 def test_what_cannot_be_by_what_is_declared_is_said_first():
     doubt = "from ball's path gravity would be 4.9 m/s^2, not 9.81; likely fps: 42"
     said = paragraph(result(k1=entry(0.1, 0.01)) | {"impossible": [doubt]}, CHECK, None, ["box"])
-    assert said.startswith(f"Check first: {doubt}. The block slid")
+    assert said.startswith(
+        f"Check first: {doubt}. Until that is settled, what follows is no result. The block slid"
+    )
 
 
 def test_a_law_has_its_constants_in_its_formula():

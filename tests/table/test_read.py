@@ -146,6 +146,31 @@ def test_what_is_in_degrees_is_an_angle(
     np.testing.assert_allclose(table.clock, truth()[0])
 
 
+@pytest.mark.parametrize(
+    "titles",
+    ["tid (s);läge x (cm);höjd y (cm)", "idő [s];hely x [cm];táv y [cm]", "t;ort x;oops y",
+     "시간(초);가로 위치(cm);세로 위치(cm)", "czas [s];położenie x [cm];wysokość y [cm]"],
+)  # fmt: skip
+def test_words_beside_x_and_beside_y_are_no_names(titles: str, tmp_path: Path) -> None:
+    """Two bodies of one coordinate each are none."""
+    table = read(tmp_path, text(titles, body=lines(";")))
+    check(table)
+    assert len(table.names) == 1 and table.axes == ("x", "y")
+
+
+def test_seconds_since_1970_may_be_called_an_epoch(tmp_path: Path) -> None:
+    body = clocked(lambda n: f"{1764500000000 + round(1000 * STEP_S * n)}")
+    check(read(tmp_path, text("epoch_ms;x;y", body=body)))
+
+
+def test_a_time_that_counts_the_frames_again_is_none(tmp_path: Path) -> None:
+    """TrackMate's, of a film whose rate it was not told."""
+    body = [f"{n}.0,{n},{x},{y}" for n, (_, x, y) in enumerate(truth().T)]
+    table = read(tmp_path, text("T,Frame,X,Y", body=body), fps=25.0)
+    assert table.is_in_frames
+    np.testing.assert_array_equal(table.clock, np.arange(ROWS))
+
+
 ENCODINGS = {
     "utf-8-sig": "t,x,y",
     "utf-16": "t,x,y",
@@ -210,7 +235,7 @@ def test_thousands_marks(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_in_many_ways(tmp_path: Path) -> None:
-    words = ["", "nan", "NaN", "-", "NA", "<NA>", "n.a.", "#N/A", "null"]
+    words = ["", "nan", "n.d.", "-", "NA", "<NA>", "n.a.", "#N/A", "null"]
     body = lines()
     for n, word in enumerate(words):
         body[2 * n] = f"{truth()[0, 2 * n]},{word},{word}"
@@ -516,6 +541,16 @@ def test_runs_side_by_side_are_motions_one_after_the_other(heading: str, tmp_pat
     if heading.startswith("t"):
         with pytest.raises(InputError, match="x is given twice"):
             read(tmp_path, text(heading, body=same))
+
+
+@pytest.mark.parametrize("late_s", [0.0, 2.0])
+def test_runs_of_one_coordinate_side_by_side(late_s: float, tmp_path: Path) -> None:
+    """Numbered, each with its own clock, that may go on in step with the others'."""
+    t, x, y = truth()
+    rows = [f"{a};{b};{a + late_s:.2f};{c}" for a, b, c in zip(t, x, y, strict=True)]
+    table = read(tmp_path, text("t1 (s);s1 (cm);t2 (s);s2 (cm)", body=rows))
+    assert table.axes == ("line",) and len(table.names) == 1
+    np.testing.assert_allclose(table.position[0, 0], [*x, *y])
 
 
 def test_two_motions_that_begin_alike_are_two(tmp_path: Path) -> None:

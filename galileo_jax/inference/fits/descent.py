@@ -181,9 +181,16 @@ def _tells_better(
 
 def _is_convex(curvature: Float[np.ndarray, "point parameter parameter"]) -> np.ndarray:
     """Of which points the cost bends upwards in every direction, `[point]`."""
-    is_finite = np.isfinite(curvature).all(axis=(1, 2))
-    known = np.where(is_finite[:, None, None], curvature, 0.0)
+    known, is_finite = _finite(curvature)
     return is_finite & (np.linalg.eigvalsh(known)[:, 0] > 0)
+
+
+def _finite(
+    matrices: Float[np.ndarray, "point parameter parameter"],
+) -> tuple[np.ndarray, Bool[np.ndarray, " point"]]:
+    """Matrices with unit matrices in the place of those that are not finite; and which are."""
+    is_finite = np.isfinite(matrices).all(axis=(1, 2))
+    return np.where(is_finite[:, None, None], matrices, np.eye(matrices.shape[1])), is_finite
 
 
 def _bends(
@@ -203,7 +210,7 @@ def _bends(
     for jacobian, here, there in zip(slopes.jacobian, slopes.white, ahead, strict=True):
         half = ((there - here) / AHEAD - (jacobian @ own)[..., 0]) / AHEAD  # of r''
         turned += np.swapaxes(jacobian, 1, 2) @ half[..., None]
-    bends = -np.linalg.solve(damped, slopes.among_all(turned))[..., 0]
+    bends = -(inverse(_finite(damped)[0]) @ slopes.among_all(turned))[..., 0]
     is_much = 2 * np.linalg.norm(bends, axis=1) > MOST_BENT * np.linalg.norm(steps, axis=1)
     return np.where(is_much[:, None], 0.0, bends)
 
