@@ -92,6 +92,15 @@ def test_good_clip(suffix: str, tmp_path: Path) -> None:
     assert clip.warnings == ()
 
 
+def test_the_yaml_beside_a_film_need_not_name_it(tmp_path: Path) -> None:
+    build_good(tmp_path)
+    (tmp_path / "clip.yaml").write_text(GOOD_YAML.replace("video: clip.mp4\n", ""))
+    assert "video" not in (tmp_path / "clip.yaml").read_text()
+    assert load_clip(tmp_path / "clip.mp4").video == tmp_path / "clip.mp4"
+    with pytest.raises(InputError, match="video, track: missing"):
+        load_clip(tmp_path / "clip.yaml")
+
+
 @pytest.mark.parametrize("suffix", [".yaml", ".csv"])
 def test_good_track(suffix: str, tmp_path: Path) -> None:
     clip = load_clip(build_good_track(tmp_path).with_suffix(suffix))
