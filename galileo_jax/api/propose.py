@@ -90,11 +90,18 @@ def propose(
             progress.report("looking for what moves", DETECTED * next(done) / info.frame_count)
 
         try:
-            movers = find_movers(lambda: decode.frames(path), SPAN_PX, advance=advance)
+            every = find_movers(lambda: decode.frames(path), SPAN_PX, advance=advance)
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None
-        movers = [mover for mover in movers if mover.flies or not mover.first_frame]
+        movers = [mover for mover in every if mover.flies or not mover.first_frame]
         movers = [mover for mover in movers if not mover.leaves_picture][:2] or movers[:1]
+        if not movers and every:
+            first = every[0]
+            raise InputError(
+                f"{path}: what moves in it is not seen before picture {first.first_frame}, where "
+                f"something is at {first.point_px[0]:.0f} {first.point_px[1]:.0f}; mark the "
+                "objects by hand"
+            )
         if not movers:
             raise InputError(f"{path}: nothing moves in it; mark the objects by hand")
         with progress.part(DETECTED, 1.0):

@@ -99,3 +99,14 @@ def test_a_table_of_temperatures(titles, row, said, more, tmp_path, monkeypatch,
     ]
     path.write_text("\n".join((titles, *rows)) + "\n")
     assert said in said_of(path, monkeypatch, capsys, *more)
+
+
+@pytest.mark.video
+def test_a_film_whose_thing_shows_later_says_where(tmp_path, monkeypatch, capsys):
+    """Not that nothing moves in it."""
+    t = np.clip((np.arange(60) - 20) / 30, 0.0, None)
+    way = np.stack([60 + 90 * t**2, 50 + 40 * t**2, np.zeros(60)], axis=1)
+    way[:12] = [-300.0, -300.0, 0.0]
+    told = said_of(filmed(tmp_path, way), monkeypatch, capsys, *SAID)
+    assert "nothing moves" not in told and "--point X Y" in told
+    assert "what moves in it is not seen before picture" in told
