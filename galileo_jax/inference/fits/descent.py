@@ -189,7 +189,7 @@ def _finite(
     matrices: Float[np.ndarray, "point parameter parameter"],
 ) -> tuple[np.ndarray, Bool[np.ndarray, " point"]]:
     """Matrices with unit matrices in the place of those that are not finite; and which are."""
-    is_finite = np.isfinite(matrices).all(axis=(1, 2))
+    is_finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     return np.where(is_finite[:, None, None], matrices, np.eye(matrices.shape[1])), is_finite
 
 

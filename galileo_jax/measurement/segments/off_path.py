@@ -50,10 +50,10 @@ def _text(name: str, off: Bool[np.ndarray, " frame"], times_s: np.ndarray) -> st
 def off_path(observation: Observation) -> Bool[np.ndarray, "object frame"]:
     """Which places of the objects lie beside a path that goes on without them."""
     found = np.zeros_like(observation.mask)
-    is_line = observation.across.any(axis=(1, 2))
+    lines = np.flatnonzero(observation.across.any(axis=(1, 2)))
     for i in range(len(observation.names)):
         path = observation.path(i)
-        axes = 1 if is_line[i] else len(path.place_m)
+        axes = 1 if i in lines else len(path.place_m)
         while (off := next(_runs(path, axes), None)) is not None:
             found[i, path.frames[off]] = True
             path = path[np.setdiff1d(np.arange(len(path)), off)]
@@ -93,7 +93,7 @@ def _between(path: PointPath, first: int, after: int, axes: int) -> np.ndarray |
     apart = float(np.sum(beside * np.linalg.solve(cover, beside))) / (axes * len(rows)) / left
     if special.fdtrc(axes * len(rows), axes * (len(both) - 4), apart) > CHANCE:
         return None
-    return rows[[_is_off(path, whole, row, axes) for row in rows]]
+    return rows[[_is_off(path, whole, int(row), axes) for row in rows]]
 
 
 def _part(path: PointPath, own: slice | np.ndarray, degree: int) -> LinearFit:
