@@ -89,9 +89,10 @@ class Explanation:
     @cached_property
     def paragraph(self) -> str:
         """The result in the words of a lab report."""
-        shapes = [item.shape for item in self.fit.measurements[0].clip.objects]
+        objects = self.fit.measurements[0].clip.objects
+        shapes, names = [item.shape for item in objects], [item.name for item in objects]
         found = None if self.diagnosis is None else self.diagnosis.document
-        return paragraph(self.fit.result, self.check_document, found, shapes)
+        return paragraph(self.fit.result, self.check_document, found, shapes, names)
 
     @property
     def check_document(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The result in the words of a lab report: one paragraph, of what the files of a run say."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import hypot
 from typing import Any
 
@@ -12,6 +12,7 @@ from galileo_jax.report.fit_text import imperfection_text, meaning, nearness
 from galileo_jax.report.phrases import listed, sentence
 from galileo_jax.results.shown import shown, shown_parameters
 
+NUMBERED = re.compile(r"(object ?)?\d*", re.IGNORECASE)  # a name that says nothing
 BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ball"}
 FRICTION, RATIO = re.compile(r"k(\d+)"), re.compile(r"mass_ratio(?:_(\d+)_(\d+))?")
 MOST_UNSEEN = 3  # effects of which it is said what could not have been seen
@@ -25,11 +26,12 @@ def paragraph(
     check: Mapping[str, Any],
     diagnosis: Mapping[str, Any] | None = None,
     shapes: Sequence[str] = (),
+    names: Sequence[str] = (),
 ) -> str:
     """What was measured, how well the model follows it, what is missing, what could not be seen.
 
     Of result.json, of compare.json of the model without what was found missing, and, where
-    something is, of diagnosis.json; `shapes`: of the objects, as declared.
+    something is, of diagnosis.json; `shapes` and `names`: of the objects, as declared.
     """
     entries = {
         name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO
@@ -45,7 +47,7 @@ def paragraph(
         for name, entry in known.items()
         if name not in effects and not FRICTION.fullmatch(name) and not RATIO.fullmatch(name)
     }
-    body = BODIES.get(shapes[0], "body") if shapes else "body"
+    who = _who(shapes, names)
     status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
     model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
     near, found = ", ".join(nearness(result["error"])), result.get("imperfections")
@@ -53,8 +55,8 @@ def paragraph(
     said = [
         *(f"Check first: {one}." for one in result.get("impossible", ())),
         "Until that is settled, what follows is no result." if result.get("impossible") else "",
-        _frictions(known, body, shapes),
-        *_ratios(known, body),
+        _frictions(known, who, shapes),
+        *_ratios(known, who),
         _values(rest),
         _unknown([name for name in entries if name not in known], known),
         f"The model{model} follows the motion to {near}." if near else "",
@@ -89,27 +91,34 @@ def _unit(unit: str) -> str:
     return f" {plain}" if plain else ""
 
 
-def _who(number: str, body: str) -> str:
-    return f"the {body}" if number == "1" else f"object {number}"
+def _who(shapes: Sequence[str], names: Sequence[str]) -> Callable[[str], str]:
+    """What the bodies are called, by their numbers: by their names, where people gave them some."""
+    body = BODIES.get(shapes[0], "body") if shapes else "body"
+    is_named = len(names) > 1 and not any(map(NUMBERED.fullmatch, names))
+
+    def called(number: str) -> str:
+        if is_named and int(number) <= len(names):
+            return names[int(number) - 1]
+        return f"the {body}" if number == "1" else f"object {number}"
+
+    return called
 
 
-def _frictions(known: Mapping[str, Any], body: str, shapes: Sequence[str]) -> str:
+def _frictions(known: Mapping[str, Any], who: Callable[[str], str], shapes: Sequence[str]) -> str:
     """How the bodies slid."""
     found = [(m[1], entry) for name, entry in known.items() if (m := FRICTION.fullmatch(name))]
     parts: list[str] = []
     for number, entry in found:
         is_round = int(number) <= len(shapes) and shapes[int(number) - 1] != "box"
         verb = f"{'moved' if is_round else 'slid'} with a friction coefficient of"
-        parts.append(f"{_who(number, body)} {'with' if parts else verb} {_value(entry)}")
+        parts.append(f"{who(number)} {'with' if parts else verb} {_value(entry)}")
     return sentence(", ".join(parts)) if parts else ""
 
 
-def _ratios(known: Mapping[str, Any], body: str) -> list[str]:
+def _ratios(known: Mapping[str, Any], who: Callable[[str], str]) -> list[str]:
     """How heavy the bodies are beside each other."""
     return [
-        sentence(
-            f"{_who(m[1] or '1', body)} is {_value(entry)} times as heavy as object {m[2] or '2'}"
-        )
+        sentence(f"{who(m[1] or '1')} is {_value(entry)} times as heavy as {who(m[2] or '2')}")
         for name, entry in known.items()
         if (m := RATIO.fullmatch(name))
     ]

@@ -47,6 +47,19 @@ def test_a_block_whose_friction_is_known_and_nothing_is_missing():
     )
 
 
+@pytest.mark.parametrize(
+    ("names", "one", "other"),
+    [(["object1", "object2"], "The block", "object 2"), (["cart", "block"], "Cart", "block"),
+     (["mass A", "mass B"], "Mass A", "mass B"), (["1", "2"], "The block", "object 2")],
+)  # fmt: skip
+def test_two_bodies_are_called_as_people_called_them(names, one, other):
+    """The second may be the block."""
+    known = result(k1=entry(0.1, 0.01), k2=entry(0.2, 0.01), derived={"mass_ratio": entry(1, 0.1)})
+    said = paragraph(known, CHECK, None, ["box", "box"], names)
+    assert f"{one} slid with a friction coefficient of" in said
+    assert f", {other} with" in said and f" times as heavy as {other}." in said
+
+
 def test_what_is_not_determined_is_said_and_is_given_no_value():
     known = result(
         m1=entry(0.4, 0.1, "kg", False),
