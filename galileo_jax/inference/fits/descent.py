@@ -14,7 +14,8 @@ along it tells the residuals' second derivative r'' in its direction, and it end
 beside. Forty-four steps along a valley (friction and wheels) become five.
 
 Where much is left that the model cannot explain, J^T J + 1 is not the curvature of the cost: what
-it lacks, S = sum_i r_i r_i'', is learned from how slopes change from step to step (`secants`).
+it lacks, S = sum_i r_i r_i'', is learned from how slopes change from step to step (`secants`); of
+few points only: of many most are still on their way, and far steps tell little of S.
 
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983; M. K.
 Transtrum, J. P. Sethna, Improvements to the Levenberg-Marquardt algorithm, arXiv 1201.5885; J. E.
@@ -49,7 +50,7 @@ from galileo_jax.similarity.noise_scale import fitted_noise_scale
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
 PARAMETERS = 16  # numbers of them are rounded up to multiples, where a step is proposed
-FEW = 4  # proposals of which all slopes are taken
+FEW = 4  # proposals of which all slopes are taken, and from which the cost's curvature is learned
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
@@ -284,7 +285,7 @@ class Descent:
             new, better, found = self._quadratic(there, own, widths, active)
             is_first = np.full(len(active), num_steps == 0)
             beside = second[active]
-            if self.is_smooth and num_steps:
+            if self.is_smooth and num_steps and len(active) <= FEW:
                 is_better = _tells_better(own, new, bends[active], beside)
                 rows = active[better]
                 second[rows] = self._secants(
