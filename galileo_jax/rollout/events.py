@@ -164,13 +164,12 @@ class Tableau(NamedTuple):
 
     nodes: tuple[float, ...]  # `[stage]`, of the step
     stages: tuple[tuple[float, ...], ...]  # for each stage its weights of the rates before
-    weights: tuple[float, ...]  # `[stage]`
+    weights: tuple[float, ...]  # `[stage]`, of the mean
+    total: float = 1.0  # of the weights
 
 
 CLASSICAL = Tableau(
-    (0.0, 1 / 2, 1 / 2, 1.0),
-    ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
-    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    (0.0, 0.5, 0.5, 1.0), ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1.0, 2.0, 2.0, 1.0), 6.0
 )
 """Of fourth order (Kutta, 1901)."""
 DORMAND_PRINCE = Tableau(
@@ -198,22 +197,20 @@ def runge_kutta(
     """The state after one step of a Runge-Kutta method; `rate` of state and time."""
     rates: list[State] = []
 
-    def moved(weights: Sequence[float]) -> State:
+    def moved(weights: Sequence[float], total: float = 1.0) -> State:
         used = [(weight, own) for weight, own in zip(weights, rates, strict=True) if weight]
-        if not used:
-            return state
-        weights, changes = zip(*used, strict=True)
 
         def leaf(value: Any, *changes: Any) -> Any:
-            return value + step_s * sum(
-                w * change for w, change in zip(weights, changes, strict=True)
-            )
+            if not changes:
+                return value
+            each = zip(used, changes, strict=True)
+            return value + step_s * (sum(weight * change for (weight, _), change in each) / total)
 
-        return jax.tree.map(leaf, state, *changes)
+        return jax.tree.map(leaf, state, *(own for _, own in used))
 
     for node, weights in zip(method.nodes, method.stages, strict=True):
         rates.append(rate(moved(weights), time_s + node * step_s))
-    return moved(method.weights)
+    return moved(method.weights, method.total)
 
 
 def reaches_s(distance: Any, v: Any, a: Any) -> Any:

@@ -211,7 +211,11 @@ def _bends(
     for jacobian, here, there in zip(slopes.jacobian, slopes.white, ahead, strict=True):
         half = ((there - here) / AHEAD - (jacobian @ own)[..., 0]) / AHEAD  # of r''
         turned += np.swapaxes(jacobian, 1, 2) @ half[..., None]
-    bends = -(inverse(_finite(damped)[0]) @ slopes.among_all(turned))[..., 0]
+    turned = slopes.among_all(turned)
+    try:
+        bends = -np.linalg.solve(damped, turned)[..., 0]
+    except np.linalg.LinAlgError:  # slopes so steep that rounding has left nothing of the prior
+        bends = -(inverse(_finite(damped)[0]) @ turned)[..., 0] * points.free
     is_much = 2 * np.linalg.norm(bends, axis=1) > MOST_BENT * np.linalg.norm(steps, axis=1)
     return np.where(is_much[:, None], 0.0, bends)
 
