@@ -116,6 +116,24 @@ class Misfit(Banana):
         return Slopes([jacobian], self.whites_of(points, [(z, z, z)]), index, 3)
 
 
+class Steep(Banana):
+    """One residual of two parameters, so steep that nothing is left of the prior beside it."""
+
+    def whites_of(self, points: Batch, motions):
+        return [np.repeat(1e9 * (motions[0][0][:, :1] + motions[0][0][:, 1:2] - 1), 2, axis=1)]
+
+    def slopes(self, points: Batch, steps: np.ndarray, sides: Sides, motions=None) -> Slopes:
+        z, jacobian = points.z, np.zeros((len(points.z), 2, 3))
+        jacobian[:, :, :2] = 1e9
+        index = np.tile(np.arange(3), (len(z), 1))
+        return Slopes([jacobian], self.whites_of(points, [(z, z, z)]), index, 3)
+
+
+def test_slopes_that_leave_nothing_of_the_prior_are_no_crash():
+    found = Descent(Steep(), np.ones(3), True, "ahead")(batch([0.3, 0.2, 0.1]), 1e-3, 30)  # pyright: ignore
+    assert np.isfinite(found.best.z).all()
+
+
 def test_where_much_is_left_steps_know_the_curvature():
     steps = []
     for is_smooth in (True, False):

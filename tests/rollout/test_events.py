@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.rollout.events import (
+    CLASSICAL,
+    DORMAND_PRINCE,
+    Tableau,
     cubic,
     newton,
     reaches_s,
@@ -71,16 +74,17 @@ def test_newtons_last_step_carries_the_slope_of_the_root():
     assert float(slope) == pytest.approx(-0.5 * 4.0**-1.5, abs=EXACT)
 
 
-def test_runge_kutta_is_of_fourth_order():
+@pytest.mark.parametrize("method, order", [(CLASSICAL, 4), (DORMAND_PRINCE, 5)])
+def test_runge_kutta_is_of_its_order(method: Tableau, order: int):
     def end(steps: int) -> float:
         state = {"x": jnp.asarray(1.0), "v": jnp.asarray(0.0)}
         for k in range(steps):
             state = runge_kutta(
-                lambda at, t: {"x": at["v"], "v": -at["x"]}, state, k / steps, 1 / steps
+                lambda at, t: {"x": at["v"], "v": -at["x"]}, state, k / steps, 1 / steps, method
             )
         return abs(float(state["x"]) - math.cos(1.0))
 
-    assert end(8) / end(16) == pytest.approx(16.0, rel=0.2)
+    assert end(8) / end(16) == pytest.approx(2.0**order, rel=0.2)
 
 
 def ball(height: jax.Array, e: jax.Array, last_s: float, most: int) -> jax.Array:

@@ -41,3 +41,15 @@ def test_beyond_the_border_the_last_pixels_go_on():
     own = np.array([[-20.0], [0.0]], np.float32)
     found = Picture(grey).at(np.array([3.0, 15.0, 0.0]), own, 20.0, 0.8)
     assert found[0] == pytest.approx(0.0, abs=3.0)
+
+
+def test_a_large_thing_is_read_as_a_small_one():
+    """Of more places than OpenCV takes in a row (a box of 200 px has them)."""
+    y, x = np.mgrid[:260, :260].astype(float)
+    large = Picture(np.round(waves(x, y)).astype(np.uint8))
+    own = np.stack(np.meshgrid(np.arange(-100, 100), np.arange(-100, 100)))
+    own = own.reshape(2, -1).astype(np.float32)
+    pose, some = np.array([130.3, 129.6, 0.1]), slice(None, None, 997)
+    found = large.at(pose, own, 142.0, 1.0)
+    assert found.shape == (40000,)
+    np.testing.assert_allclose(found[some], large.at(pose, own[:, some], 142.0, 1.0), atol=1e-3)

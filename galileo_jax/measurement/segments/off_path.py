@@ -10,7 +10,6 @@ Some places in a row are no places of the object if
 A stop or a bounce fails the first; a bend that is quick for the frame rate fails the last.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -54,50 +53,53 @@ def off_path(observation: Observation) -> Bool[np.ndarray, "object frame"]:
     for i in range(len(observation.names)):
         path = observation.path(i)
         axes = 1 if i in lines else len(path.place_m)
-        while (off := next(_runs(path, axes), None)) is not None:
+        while (off := _first_run(path, axes)) is not None:
             found[i, path.frames[off]] = True
             path = path[np.setdiff1d(np.arange(len(path)), off)]
     return found
 
 
-def _runs(path: PointPath, axes: int) -> Iterator[np.ndarray]:
-    """Places, by their numbers in the path, that lie beside it in a row; `axes` were measured."""
+def _first_run(path: PointPath, axes: int) -> np.ndarray | None:
+    """The first places in a row that lie beside a path, by their numbers in it; None: none do.
+
+    `axes`: how many were measured.
+    """
     for first in range(BESIDE, len(path) - BESIDE):
-        before = _part(path, slice(first - BESIDE, first), 2)
-        if not _is_off(path, before, first, axes):
+        near = path[first - BESIDE : first + MOST + BESIDE]
+        if not _is_off(near, _part(near, slice(BESIDE), 2), BESIDE, axes):
             continue
-        for after in range(first + 1, min(first + MOST, len(path) - BESIDE) + 1):
-            off = _between(path, first, after, axes)
+        for after in range(BESIDE + 1, len(near) - BESIDE + 1):
+            off = _between(near, after, axes)
             if off is not None:
-                yield off
-                break
+                return first - BESIDE + off
+    return None
 
 
-def _between(path: PointPath, first: int, after: int, axes: int) -> np.ndarray | None:
-    """Which of the places from `first` to before `after` lie beside the path; None: it is one."""
-    sides = slice(first - BESIDE, first), slice(after, after + BESIDE)
-    parabolas = [_part(path, side, 2) for side in sides]
-    if not _is_off(path, parabolas[1], after - 1, axes):
+def _between(near: PointPath, after: int, axes: int) -> np.ndarray | None:
+    """Which places from `BESIDE` to before `after` lie beside a short path; None: it is one."""
+    sides = slice(BESIDE), slice(after, after + BESIDE)
+    parabolas = [_part(near, side, 2) for side in sides]
+    if not _is_off(near, parabolas[1], after - 1, axes):
         return None
     both = np.r_[sides]
-    whole = _part(path, both, 3)
+    whole = _part(near, both, 3)
     alone = sum(float(np.sum(fit.left**2)) for fit in parabolas)
     freedom = axes * sum(len(fit.design) - fit.design.shape[1] for fit in parabolas)
     more = axes * (len(both) - 4) - freedom
     worse = (float(np.sum(whole.left**2)) - alone) / more / (alone / freedom)
     if special.fdtrc(more, freedom, worse) < DOUBT:
         return None
-    rows = np.arange(first, after)
-    beside, cover = _beside(path, whole, rows)
+    rows = np.arange(BESIDE, after)
+    beside, cover = _beside(near, whole, rows)
     left = float(np.sum(whole.left**2)) / (axes * (len(both) - 4))
     apart = float(np.sum(beside * np.linalg.solve(cover, beside))) / (axes * len(rows)) / left
     if special.fdtrc(axes * len(rows), axes * (len(both) - 4), apart) > CHANCE:
         return None
-    return rows[[_is_off(path, whole, int(row), axes) for row in rows]]
+    return rows[[_is_off(near, whole, int(row), axes) for row in rows]]
 
 
 def _part(path: PointPath, own: slice | np.ndarray, degree: int) -> LinearFit:
-    """A polynomial of time through some places; time is counted from the path's first place."""
+    """A polynomial through some places of a short path, of the time since its first place."""
     return polynomial(path.times_s[own] - path.times_s[0], path.place_m[:, own].T, degree)
 
 
