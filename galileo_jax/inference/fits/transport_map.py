@@ -77,10 +77,12 @@ class Valley:
 
     def inverse(self, z: Points) -> np.ndarray:
         """W of z, `[point, direction]`."""
-        u = self.along(z)
-        for i in range(1, u.shape[1]):
-            u[:, i] -= u[:, :i] ** 2 @ self.quadratic[i, :i] + u[:, :i] ** 3 @ self.cubic[i, :i]
-        return u @ self.axes.T
+        u = self.along(z).T.copy()  # rows of points, which are many, one after the other
+        for i, own in enumerate(u[:-1]):
+            later, square = slice(i + 1, None), own * own
+            u[later] -= np.outer(self.quadratic[later, i], square)
+            u[later] -= np.outer(self.cubic[later, i], square * own)
+        return u.T @ self.axes.T
 
     @property
     def log_volume(self) -> float:
