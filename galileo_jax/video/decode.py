@@ -5,7 +5,7 @@ import itertools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.video import steady
 from galileo_jax.video.stamps import (
     at_declared_rate,
     clock_of,
@@ -55,29 +56,22 @@ def frames(path: Path) -> Iterator[np.ndarray]:
 
     As players show them: upright, with square pixels, without what an edit list hides; an
     interlaced picture is two, one for each of its fields. Pictures that repeat the one before,
-    and black or faded ones at the beginning and the end, are left out.
+    and black or faded ones at the beginning and the end, are left out. Where the camera moves they
+    are drawn as if it had rested where it took the first.
 
     Raises `InputError` for a missing or undecodable file. A file that breaks off ends the
     iteration; `probe` is what tells it from a whole one.
     """
-    path = Path(path)
-    scan = _scan(path)
-    with _opened(path) as opened:
-        for is_used, frame in zip(scan.used, _shown(*opened, scan.first_field), strict=False):
-            if not is_used:
-                continue
-            picture = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90) % 4)
-            picture = np.ascontiguousarray(picture)
-            if picture.shape[1::-1] != scan.size_px:
-                picture = cv2.resize(picture, scan.size_px, interpolation=cv2.INTER_LANCZOS4)
-            yield picture
+    scan = _scan(Path(path))
+    pictures = _pictures(Path(path), scan)
+    return pictures if scan.camera is None else steady.drawn(pictures, scan.camera)
 
 
 def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     """Decodes the whole film once and says what it is.
 
-    Keeps one picture and some bytes per picture. A declared rate that contradicts the container's
-    is only warned of: high-speed films often say 29.97.
+    Keeps some pictures, however many there are, and some bytes of each. A declared rate that
+    contradicts the container's is only warned of: high-speed films often say 29.97.
 
     Raises `InputError` if the file is missing, empty, no film, a picture, or cut off; or if its
     pictures' times are missing, twice the same, or go back.
@@ -120,8 +114,8 @@ def predicted_from_before(path: Path) -> np.ndarray:
     """`[picture]`, bool: whether a picture was coded as what changes since the one before it.
 
     Not so are whole pictures (I), those that are predicted from both sides (B), those that follow
-    them, and all of a film whose pixels are not those that were coded. Where a file does not say,
-    pictures count as predicted.
+    them, and all of a film whose pixels are not those that were coded, as where the camera moves.
+    Where a file does not say, pictures count as predicted.
 
     Raises `InputError` as `frames`.
     """
@@ -131,7 +125,9 @@ def predicted_from_before(path: Path) -> np.ndarray:
     is_predicted[1:] &= kinds[:-1] != "B"
     # What comes after a picture that is left out is not predicted from the one before that.
     is_predicted[1:] &= scan.used[:-1]
-    return is_predicted[scan.used] & (scan.is_square and not scan.is_interlaced)
+    return is_predicted[scan.used] & (
+        scan.is_square and not scan.is_interlaced and scan.camera is None
+    )
 
 
 def is_interlaced(path: Path) -> bool:
@@ -159,6 +155,10 @@ class _Scan:
     contrast: np.ndarray  # `[picture]`, grey levels
     rate: float  # pictures per second that the container states; 0: none
     missing: int  # pictures that it announces and that are not there
+    # from each picture that is looked at to the first of them, px, where the camera moves
+    camera: steady.Homographies | None = None
+    # pictures that are looked at in which it moves, and where what stands still is not found
+    camera_lost: tuple[int, ...] = ()
 
     @property
     def is_interlaced(self) -> bool:
@@ -198,6 +198,18 @@ class _Scan:
             yield (
                 f"{len(numbers)} of {total} pictures repeat the one before"
                 f"{each_times(total, kept)} ({listed(numbers)}): left out{counted}"
+            )
+        if self.camera is not None:
+            off = steady.displacements_px(self.camera, self.size_px[::-1])
+            yield (
+                f"the camera moves by up to {np.abs(off).max():.0f} px: pictures are drawn as if "
+                "it had rested, by what stands still in them; places are those of the first"
+            )
+        if self.camera_lost:
+            yield (
+                "the camera moves, and in picture "
+                f"{listed(np.array(self.camera_lost))} too little stands still to tell how: taken "
+                "as if it rested; film with a camera that does"
             )
         if self.missing:
             yield f"{total} of {total + self.missing} announced frames can be decoded"
@@ -272,18 +284,44 @@ def _scan(path: Path) -> _Scan:
 @functools.lru_cache(64)
 def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
     """Once for each content: who draws marks has the clip checked at every step."""
-    scan, rows = _passed(path, None)
+    scan, rows, glimpses = _passed(path, None)
     if (first := first_field(rows)) is not None:
-        scan, _ = _passed(path, first)
+        scan, _, glimpses = _passed(path, first)
     if len(scan.kinds) == 0:
         raise InputError(f"{path}: cannot be decoded: without frames, or damaged; a video expected")
-    return scan
+    return _with_camera(path, scan) if glimpses.camera_moves(scan.used) else scan
 
 
-def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
+def _with_camera(path: Path, scan: _Scan) -> _Scan:
+    """With how the camera moves, or where that is not told."""
+    smaller = (
+        steady.small(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)) for picture in _pictures(path, scan)
+    )
+    found = list(steady.to_first(smaller))
+    known = [one for one in found if one is not None]
+    if len(known) < len(found):
+        return replace(scan, camera_lost=tuple(i for i, one in enumerate(found) if one is None))
+    factor = scan.size_px[0] / min(scan.size_px[0], steady.WIDEST_PX)
+    return replace(scan, camera=steady.enlarged(np.stack(known), factor))
+
+
+def _pictures(path: Path, scan: _Scan) -> Iterator[np.ndarray]:
+    """As `frames`, wherever the camera was."""
+    with _opened(path) as opened:
+        for is_used, frame in zip(scan.used, _shown(*opened, scan.first_field), strict=False):
+            if not is_used:
+                continue
+            picture = np.rot90(frame.to_ndarray(format="bgr24"), round(frame.rotation / 90) % 4)
+            picture = np.ascontiguousarray(picture)
+            if picture.shape[1::-1] != scan.size_px:
+                picture = cv2.resize(picture, scan.size_px, interpolation=cv2.INTER_LANCZOS4)
+            yield picture
+
+
+def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows, steady.Glimpses]:
     """What one pass shows, of whole pictures or of fields, and what `first_field` reads."""
     stamps_s, kinds, change, contrast, rows = [], [], [], [], NO_ROWS
-    size_px, tick_s, before = (0, 0), 0.0, None
+    size_px, tick_s, before, glimpses = (0, 0), 0.0, None, steady.Glimpses()
     with _opened(path) as (container, stream):
         aspect, rate = float(stream.sample_aspect_ratio or 1), float(stream.average_rate or 0)
         is_even = container.format.name == "avi"  # whose stamps are the order of coding
@@ -295,6 +333,7 @@ def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
                 rows = rows + rows_of(before, grey)
             change.append(np.inf if before is None else _change(before, grey))
             contrast.append(float(cv2.meanStdDev(grey)[1][0, 0]))
+            glimpses.add(grey)
             stamps_s.append(np.nan if frame.pts is None else float(frame.pts * frame.time_base))
             kinds.append(KINDS[int(frame.pict_type)].upper())
             tick_s, before = float(frame.time_base or 0), grey
@@ -304,7 +343,7 @@ def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
         size_px, aspect, first, stamps, is_even, tick_s, "".join(kinds), np.array(change),
         np.array(contrast), rate, missing,
     )  # fmt: skip
-    return scan, rows
+    return scan, rows, glimpses
 
 
 def _shown_size(frame: Any, aspect: float) -> tuple[int, int]:

@@ -72,8 +72,23 @@ def test_frames_predicted_from_both_sides_do_not_count(
         assert "".join("1" if one else "0" for one in found) == expected
 
 
+def test_a_longer_film_takes_no_more_memory(tmp_path: Path) -> None:
+    def peak(frame_count: int) -> int:
+        path = write_video(tmp_path / f"{frame_count}.mp4", frame_count=frame_count)
+        tracemalloc.start()
+        for _ in frames(path):
+            pass
+        _, found = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return found
+
+    frame_bytes = 320 * 180 * 3
+    assert peak(250) < peak(125) + 2 * frame_bytes
+
+
 def test_frames_keep_one_frame_in_memory(tmp_path: Path) -> None:
     path = write_video(tmp_path / "long.mp4", frame_count=150)
+    probe(path)
     frame_bytes = 320 * 180 * 3
     tracemalloc.start()
     for _ in frames(path):
