@@ -127,8 +127,8 @@ def simulate(
       direction: of the travel in the picture, "right" or "left".
       no_points: the yaml does not say where the objects are.
       hand: a hand lets object 1 go.
-      camera_fault: keystone, roll (how the camera is held), origin, points (of the yaml, off by
-        a few px); one or several.
+      camera_fault: keystone, roll, hand_held (how the camera is held), origin, points (of the
+        yaml, off by a few px); one or several.
       noise: of the sensor, grey levels of 255.
       exposure: of a frame, s.
       defocus: standard deviation of the blur, px.

@@ -22,6 +22,7 @@ SMALLEST_SPAN_M = 0.2  # of a motion without a ramp
 TABLE_AT = 0.80  # of the picture's height
 KEYSTONE_PER_M = 0.01
 ROLL_RAD = math.radians(0.5)
+SWAY_RAD = math.radians(0.2)  # sd of how far a camera in a hand turns
 RAMP_ABOVE_M = 0.12  # how far the ramp goes on above object 1
 
 
@@ -102,6 +103,7 @@ def filming_of(
         defocus_px=settings.defocus,
         repeated_frames=tuple(sorted(map(int, missed))),
         hand=hand,
+        sway_rad=SWAY_RAD if "hand_held" in settings.camera_fault else 0.0,
     )
 
 

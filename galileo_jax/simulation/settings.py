@@ -26,7 +26,7 @@ SHAPES: dict[str, tuple[Shape, ...]] = {
 
 FREE_SCENARIOS = ("fall", "flight", "spring", "liquid", "pendulum", "from_above")
 SCENARIO_NAMES = (*SHAPES, *FREE_SCENARIOS)
-CAMERA_FAULTS = ("keystone", "roll", "origin", "points")
+CAMERA_FAULTS = ("keystone", "roll", "hand_held", "origin", "points")
 DIRECTIONS = ("right", "left")
 MOST_OBJECTS = 9  # of a multi
 TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"

@@ -9,6 +9,8 @@ import pytest
 
 from galileo_jax.video import steady
 from galileo_jax.video.decode import frames, probe
+from galileo_jax.video.synthetic import Body, Camera, Filming, Motion, Ramp, render_frames
+from galileo_jax.video.synthetic.filming import sway, turned_camera
 from tests.video.make_video import write_film
 
 WIDTH, HEIGHT, FOCAL_PX = 480, 270, 600.0
@@ -143,6 +145,23 @@ def test_pictures_of_a_camera_at_rest_are_left_as_they_are(tmp_path: Path):
     for drawn, picture in zip(frames(path), pictures, strict=True):
         np.testing.assert_array_equal(drawn[..., 0], picture)
     assert probe(path).warnings == ()
+
+
+@pytest.mark.video
+def test_a_rendered_hand_is_undone():
+    motion = Motion(
+        np.array([0.0, 1.0]), np.array([[[0.1, 0.6], [0.025, 0.025]]]), np.zeros((1, 2))
+    )
+    camera, filming = Camera(400.0, (60.0, 200.0), (400, 240)), Filming(sway_rad=4e-3)
+    ramp = Ramp(0.3, 0.2)
+    box = (Body("box", (0.06, 0.05, 0.05)),)
+    made = render_frames(motion, box, camera, ramp, filming, COUNT, seed=1)
+    seen = [cv2.cvtColor(frame.picture, cv2.COLOR_BGR2GRAY) for frame in made]
+    turns = sway(filming, COUNT, np.random.default_rng([1, 2]))
+    assert np.abs(turns).max() > 4e-3 and not turns[0].any()
+    for one, turn in zip(steady.to_first(seen), turns, strict=True):
+        both = one @ turned_camera(turn, camera.size_px)
+        assert np.abs(steady.displacements_px([both], (240, 400))[0, 12]).max() < 0.15
 
 
 @pytest.mark.video

@@ -3,7 +3,11 @@
 from dataclasses import dataclass
 from typing import Literal
 
+import cv2
 import numpy as np
+
+FOCAL_WIDTHS = 1.2  # of a picture: a phone's lens, zoomed in a little
+SWAY_S, SWAY_STEPS = 0.2, 10  # of a hand's sway; steps in such a time
 
 
 @dataclass(frozen=True)
@@ -75,3 +79,36 @@ class Filming:
     # frames that the camera missed; the picture before stands there again
     repeated_frames: tuple[int, ...] = ()
     hand: Hand | None = None  # the hand that lets object 1 go; None = nobody is in the picture
+    # sd of how far the camera turns about each axis, rad; 0: it stands on something
+    sway_rad: float = 0.0
+
+
+def turned_camera(turns_rad: np.ndarray, size_px: tuple[int, int]) -> np.ndarray:
+    """The homography from places in a camera's picture to those after it has turned, `[3, 3]`.
+
+    `turns_rad`: to the side, up, and about the line of sight. Source: R. Hartley, A. Zisserman,
+    Multiple View Geometry (2004), 8.4.
+    """
+    width, height = size_px
+    focal_px = FOCAL_WIDTHS * width
+    lens = np.array([[focal_px, 0, width / 2], [0, focal_px, height / 2], [0, 0, 1]])
+    across, up, round_sight = turns_rad
+    turn, _ = cv2.Rodrigues(np.array([up, across, round_sight]))
+    return lens @ turn @ np.linalg.inv(lens)
+
+
+def sway(filming: Filming, num_frames: int, rng: np.random.Generator) -> np.ndarray:
+    """How far a camera in a hand has turned in each frame, `[frame, 3]`, rad; first not at all.
+
+    A critically damped oscillator driven by white noise, which forgets in some `SWAY_S`.
+    """
+    steps = int(np.ceil(SWAY_STEPS / (filming.fps * SWAY_S)))
+    dt = 1 / (filming.fps * steps)
+    rate, place, speed, found = 1 / SWAY_S, np.zeros(3), np.zeros(3), []
+    push = 2 * filming.sway_rad * rate**1.5 * np.sqrt(dt)
+    for _ in range(num_frames):
+        found.append(place)
+        for _ in range(steps):
+            speed = speed + dt * rate * (-rate * place - 2 * speed) + push * rng.normal(size=3)
+            place = place + dt * speed
+    return np.array(found)

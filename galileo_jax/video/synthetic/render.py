@@ -14,7 +14,14 @@ import cv2
 import numpy as np
 
 from galileo_jax.runtime.atomic_write import replacing
-from galileo_jax.video.synthetic.filming import Camera, Filming, Hand, project
+from galileo_jax.video.synthetic.filming import (
+    Camera,
+    Filming,
+    Hand,
+    project,
+    sway,
+    turned_camera,
+)
 from galileo_jax.video.synthetic.textures import Body, body_texture, hand_texture, wall, wood
 
 SUPERSAMPLING = 3
@@ -126,7 +133,7 @@ def render_frames(
 ) -> Iterator[Frame]:
     """Yields the frames, one at a time.
 
-    The same seed gives the same frames. Looks and noise are drawn from separate streams: a
+    The same seed gives the same frames. Looks, noise and sway have streams of their own: a
     clip with another noise level or another motion shows the same things.
     """
     looks, noise = (np.random.default_rng([seed, stream]) for stream in (0, 1))
@@ -134,6 +141,7 @@ def render_frames(
     backdrop = draw_backdrop(camera, ramp, looks)
     textures = [body_texture(body, texels_per_metre, looks) for body in bodies]
     hand = hand_texture(HAND_LENGTH_M, texels_per_metre, looks) if filming.hand else None
+    turns = sway(filming, num_frames, np.random.default_rng([seed, 2]))
     latest: Frame | None = None
     for index in range(num_frames):
         brightness = 1 + filming.flicker * noise.standard_normal()
@@ -159,6 +167,11 @@ def render_frames(
             if hand_layer := _layer(hand[0], where, camera):
                 covered = tuple(_covered(layer, hand_layer, camera.size_px) for layer in layers)
                 hand_layer.over(picture)
+        if filming.sway_rad:
+            there = turned_camera(turns[index], camera.size_px)
+            picture = cv2.warpPerspective(
+                picture, there, camera.size_px, None, cv2.INTER_LANCZOS4, cv2.BORDER_REFLECT
+            )
         if filming.defocus_px:
             picture = cv2.GaussianBlur(picture, (0, 0), filming.defocus_px)
         picture = picture * brightness + filming.noise_grey_levels * grain
