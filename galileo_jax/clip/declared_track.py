@@ -51,7 +51,10 @@ def declared_table(of: DeclaredTrack) -> tuple[TrackTable, tuple[str, ...]]:
     """
     beside = (of.path.parent / item.track_file for item in of.file.objects if item.track_file)
     paths = [of.path, *(path for path in beside if path != of.path)]
-    tables = [_one_motion(replace(of, path=path), read_table(path, of.fps)) for path in paths]
+    tables = [
+        _one_motion(replace(of, path=path), read_table(path, of.fps, len(of.names)))
+        for path in paths
+    ]
     return _in_declared_order(of, _joined(paths, tables))
 
 

@@ -147,14 +147,21 @@ def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[st
 
 
 def along_line(
-    of: DeclaredTrack, axis: str, times: np.ndarray, way_m: np.ndarray, rounding_m: float
-) -> Observation:
-    """One coordinate `[object, row]`, m, as a motion along the scenario's line.
+    of: DeclaredTrack,
+    table: TrackTable,
+    times: np.ndarray,
+    way_m: np.ndarray,
+    rounding_m: float,
+) -> tuple[Observation, tuple[str, ...]]:
+    """The one coordinate of a table, `[object, row]`, m, as a motion along the scenario's line.
+
+    Of what goes down a slope y alone is the height if it falls, or if its title or `track_y` says
+    so. Returns what is said of that, too.
 
     Raises:
       InputError: the scenario's motion is along no line, or its slope is not known.
     """
-    scenario, file = of.scenario, of.file
+    scenario, file, axis, y_axis = of.scenario, of.file, table.axes[0], table.y_axis
     if scenario.line is None:
         raise of.wrong(
             f"only one coordinate ({axis}), but scenario {file.scenario} "
@@ -174,10 +181,21 @@ def along_line(
     else:
         sign = sign_along(file, times, way_m[0])
         seen = way_m[0][np.isfinite(way_m[0])]
-        if scenario.up_shows == "sink" and seen[-1] > seen[0]:
+        if scenario.up_shows == "sink" and y_axis is not None:
+            sign = 1 if y_axis == "up" else -1
+        elif scenario.up_shows == "sink" and seen[-1] > seen[0]:
             raise of.wrong_key(rises_or_sinks(of, "the way" if axis == "line" else axis))
+    said: tuple[str, ...] = ()
+    if scenario.line == "slope" and axis != "line":
+        is_height = axis == "y" and (sign < 0 or (file.track_y or y_axis) is not None)
+        what = "the height" if is_height else "the way down the slope"
+        said = (f"{of.path}: {axis} alone is taken for {what}",)
+        steepness = math.sin(math.radians(file.ramp_angle_deg or 0.0)) if is_height else 1.0
+        if steepness <= 0:
+            raise of.wrong_key("ramp_angle_deg: 0, where a height alone tells no way; x expected")
+        way_m, sd_m = way_m / steepness, sd_m / steepness
     on_line = line_observation(file, of.names, times, sign * way_m, sd_m)
-    return replace(on_line, rows_of_noise=len(times))
+    return replace(on_line, rows_of_noise=len(times)), said
 
 
 def rises_or_sinks(of: DeclaredTrack, axis: str, usual: str = "up") -> str:
@@ -186,13 +204,6 @@ def rises_or_sinks(of: DeclaredTrack, axis: str, usual: str = "up") -> str:
         f"track_y: missing; in {of.path.name} it rises if {axis} points {usual}, and sinks if not "
         "(a depth points down); write track_y: up | down"
     )
-
-
-def way_alone(of: DeclaredTrack, axis: str) -> tuple[str, ...]:
-    """What is said of one coordinate down a slope: it may be meant across the picture, or up it."""
-    if of.scenario.line != "slope" or axis == "line":
-        return ()
-    return (f"{of.path}: {axis} alone is taken for the way down the slope",)
 
 
 def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:

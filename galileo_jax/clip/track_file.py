@@ -24,7 +24,6 @@ from galileo_jax.clip.track_axes import (
     rises_or_sinks,
     swung,
     up_from_motion,
-    way_alone,
 )
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
@@ -43,6 +42,7 @@ from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
 from galileo_jax.table.track_table import METRES_PER_UNIT, Calibration, TrackTable
 from galileo_jax.table.tracker_trk import is_trk
+from galileo_jax.video.stamps import AS_DECLARED, Clock, at_declared_rate
 
 TRACK_SUFFIXES = (
     *(".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5"),
@@ -163,8 +163,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     elif len(table.axes) == 1:
         start = table.position[0, 0, 0] if is_px else 0.0
         way = (table.position[:, 0] - start) * metres
-        said = way_alone(of, table.axes[0])
-        observation = along_line(of, table.axes[0], times, way, _last_place_m(table, metres)[0])
+        observation, said = along_line(of, table, times, way, _last_place_m(table, metres)[0])
     else:
         table, turned = in_plane(of, table)
         y_axis, told = _y_axis_of(of, table, times, unit)
@@ -309,11 +308,24 @@ def _times(of: DeclaredTrack, table: TrackTable) -> np.ndarray:
             f"fps: missing; {of.path.name} {has}; write fps: and the camera's true "
             "frame rate, such as fps: 30.0"
         )
-    return table.seconds(of.fps)
+    times = table.seconds(of.fps)
+    if table.is_in_frames or of.fps is None:
+        return times
+    with named(of.path):
+        check_times(times)
+    return at_declared_rate(Clock(times, _frame_rate(times), False), of.fps)[0].times_s
 
 
 def _doubts(of: DeclaredTrack, table: TrackTable) -> tuple[str, ...]:
-    if not table.is_in_frames or of.fps is None or table.frame_s is None:
+    if of.fps is not None and not table.is_in_frames:
+        rate = _frame_rate(table.clock)
+        if abs(of.fps / rate - 1) <= AS_DECLARED:
+            return ()
+        return (
+            f"{of.yaml_path}: fps: {of.fps:g} declared, the times in {of.path.name} say "
+            f"{rate:.4g}; they are rescaled by it (leave fps out if they are true)",
+        )
+    if of.fps is None or table.frame_s is None:
         return ()
     if abs(of.fps * table.frame_s - 1) <= 0.01:
         return ()

@@ -13,7 +13,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import clock_times
 from galileo_jax.table.heading import Heading
 from galileo_jax.table.numbers import Numbers, is_nothing, is_number, parse_columns
-from galileo_jax.table.titles import LENGTHS, RADIANS, Title, is_no_place
+from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, Title, is_no_place
 from galileo_jax.table.track_table import MIN_LIKELIHOOD
 
 PLACES = ("x", "y", "z", "line", "angle")
@@ -122,6 +122,12 @@ def _ticks(numbers: Numbers) -> bool:
     return numbers.resolution < EVEN_SHARE * float(np.median(numbers.steps))
 
 
+def _rises(numbers: Numbers) -> bool:
+    """Whether a column rises, and never falls."""
+    steps = numbers.steps
+    return steps.size > 0 and bool(steps.min() >= 0 and steps.max() > 0)
+
+
 def _is_rising(numbers: Numbers) -> bool:
     values = numbers.values
     return values.size > 1 and bool((np.diff(values) > 0).all())
@@ -138,6 +144,9 @@ def _with_clock(columns: Columns) -> Columns:
     is_titled = columns.heading.is_titled
     roles = {n: columns.meanings[n].role for n in columns.numbers}
     free = [n for n, role in roles.items() if not role or (not is_titled and role in PLACES)]
+    timed = [n for n in free if columns.meanings[n].unit in SECONDS and _rises(columns.numbers[n])]
+    if timed:
+        return columns.given({timed[0]: "time"})
     counts = [n for n in free if _is_count(columns.numbers[n])]
     ticks = [n for n in free if n not in counts and _ticks(columns.numbers[n])]
     if counts:

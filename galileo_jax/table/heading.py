@@ -119,12 +119,12 @@ def split_heading(rows: Rows) -> Heading:
     return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
 
 
-def one_below_the_other(heading: Heading) -> Heading:
+def one_below_the_other(heading: Heading, num_bodies: int = 1) -> Heading:
     """Runs that stand side by side, each with its own times, as motions that follow each other.
 
-    Their columns mean the same in the same order. They are runs if a data set's name stands before
-    a colon, or their times differ; columns of named bodies only if no clock goes on in another, or
-    each has one coordinate.
+    Their columns mean the same in the same order. They are runs if one body moves, if a data set's
+    name stands before a colon, or if their times differ; columns of named bodies only if no clock
+    goes on in another, or each has one coordinate.
     """
     used = [n for n, title in enumerate(heading.titles) if title]
     parted = [_parted(heading.titles[n]) for n in used]  # data set and words
@@ -148,7 +148,8 @@ def one_below_the_other(heading: Heading) -> Heading:
     if any(heading.meanings[n].name for n in used):
         is_run = all(set(one) - set(other) for one, other in permutations(times, 2)) or width == 2
     else:
-        is_run = len({one for one, _ in parted}) == len(blocks) or times != times[:1] * len(blocks)
+        is_run = num_bodies == 1 or len({one for one, _ in parted}) == len(blocks)
+        is_run |= times != times[:1] * len(blocks)
     if not is_run:
         return heading
     titles = tuple(words for _, words in parted[:width])

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from galileo_jax.table.repeated import (
 )
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
-from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS
+from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, way_up
 from galileo_jax.table.track_table import MIN_LIKELIHOOD, Column, TrackTable
 from galileo_jax.table.tracker_trk import is_trk, read_trk
 
@@ -40,16 +41,18 @@ FILM_MS = tuple(1000 / fps for fps in (24.0, 30.0, 60.0, 120.0, 240.0))
 """Between two pictures of a film, ms: nobody measures every 33.3 s or 41.7 s."""
 
 MOST_OBJECTS = 50
+CENTRE_OF_MASS = "M"  # ImageJ's XM and YM, of the thing whose middle are X and Y
 
 SAME_CLOCK = 0.01  # of what goes by on one clock: another that is further off is another one
 
 
-def read_table(path: Path, fps: float | None = None) -> TrackTable:
+def read_table(path: Path, fps: float | None = None, num_bodies: int = 1) -> TrackTable:
     """A motion from a text table, a spreadsheet, a Tracker project or a pandas file.
 
     Args:
       path: the file.
       fps: declared frames per second; tells frames of a clock from its hundredths.
+      num_bodies: that move; the same columns again are runs of one, or else other bodies.
 
     Raises:
       InputError: one line that names the file, the line and cell or the titles, and what would be
@@ -62,7 +65,7 @@ def read_table(path: Path, fps: float | None = None) -> TrackTable:
         elif is_trk(content) and not is_spreadsheet(content):
             table = read_trk(content)
         else:
-            heading = one_below_the_other(split_heading(cells_of(content)))
+            heading = one_below_the_other(split_heading(cells_of(content)), num_bodies)
             table = _table(with_roles(heading, fps))
     return replace(table, warnings=tuple(f"{path}: {one}" for one in table.warnings))
 
@@ -115,10 +118,19 @@ def _table(columns: Columns) -> TrackTable:
         unit=unit,
         resolution=resolution,
         starts=motion_starts(clock),
-        y_axis="down" if unit == "px" and is_seen_by_program else None,
+        y_axis=_y_axis(columns, axes, unit == "px" and is_seen_by_program),
         columns=_listed(columns),
         warnings=tuple(warnings),
     )
+
+
+def _y_axis(
+    columns: Columns, axes: Sequence[str], is_picture: bool
+) -> Literal["up", "down"] | None:
+    """Which way y points: down in a picture; of one coordinate alone, as its title says."""
+    if is_picture or axes != ("y",):
+        return "down" if is_picture else None
+    return way_up(columns.name_of(columns.of("y")[0]))
 
 
 def _listed(columns: Columns) -> tuple[Column, ...]:
@@ -242,6 +254,8 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
         if {"x", "y"} & set(of):
             of.pop("line", None)
             of.pop("angle", None)
+    if set(by_name) == {"", CENTRE_OF_MASS}:
+        del by_name[CENTRE_OF_MASS]
     every = [role for of in by_name.values() for role in of]
     if len(every) == len(by_name) == len(set(every)):  # words beside x and beside y are no names
         return {"": {role: n for of in by_name.values() for role, n in of.items()}}

@@ -20,7 +20,14 @@ def _by_word(words_of: dict[Any, str]) -> dict[str, Any]:
 
 
 _LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"))
-WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
+POINTS: dict[str, Literal["up", "down"]] = {
+    word: way for way in ("up", "down") for word in _LISTS["roles"][f"y {way}"].split()
+}
+"""Of words for a height and for a depth, which way they count."""
+
+WORDS: dict[str, Role] = {
+    word: meaning.split()[0] for word, meaning in _by_word(_LISTS["roles"]).items()
+}
 FILLERS, TURNINGS, OTHER_UNITS = (
     frozenset(_LISTS[key].split()) for key in ("fillers", "turnings", "other_units")
 )
@@ -63,6 +70,12 @@ def is_no_place(text: str) -> bool:
     words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
     is_derived = any(word.rstrip("0123456789") in DERIVED for word in words)
     return is_derived or any(unit in OTHER_UNITS for unit in BRACKETS.findall(text))
+
+
+def way_up(text: str) -> Literal["up", "down"] | None:
+    """Which way a title says that an upright axis points: 'Tiefe/mm'; None: it does not."""
+    words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
+    return next((POINTS[word] for word in words if word in POINTS), None)
 
 
 def is_turning(text: str) -> bool:

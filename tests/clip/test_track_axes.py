@@ -75,6 +75,34 @@ def test_an_axis_alone_is_said_to_be_taken_for_the_way(title, said, tmp_path: Pa
     assert any("alone is taken for the way down the slope" in line for line in lines) == said
 
 
+@pytest.mark.parametrize(
+    ("title", "keys", "height"),
+    [("y (m)", "", 0.5 - 0.5 * WAY), ("y (m)", "\ntrack_y: down", 0.5 * WAY),
+     ("depth (m)", "", 0.5 * WAY), ("height (m)", "", 0.5 - 0.5 * WAY)],
+)  # fmt: skip
+def test_a_height_alone_tells_the_way_down_a_slope(title, keys, height, tmp_path: Path) -> None:
+    columns = {"t (s)": T, title: height + NOISE[0]}
+    found = observed(tmp_path, columns, "scenario: incline\nramp_angle_deg: 30" + keys)
+    along = np.array([np.cos(np.radians(30)), -np.sin(np.radians(30))])
+    way = along @ found.position_m[0]
+    np.testing.assert_allclose(way - way[0], WAY - WAY[0], atol=4e-3)
+    sd = np.sqrt(np.einsum("a,b,abt->t", along, along, found.covariance_m2[0]))
+    assert 2e-4 < sd[0] < 12e-4  # twice that of the height, 3e-4
+    assert any(
+        "y alone" in line or title[:5] in line for line in load_clip(tmp_path / "a.yaml").warnings
+    )
+
+
+@pytest.mark.parametrize(("fps", "factor"), [(240.0, 8), (30.2, 1), (30.0, 1)])
+def test_a_declared_rate_rescales_the_times_of_a_table(fps: float, factor: int, tmp_path: Path):
+    """As of a film: 240 a second that are played as 30. A rate near theirs confirms them."""
+    columns = {"t (s)": np.arange(40) / 30, "s (m)": WAY}
+    found = observed(tmp_path, columns, f"scenario: incline\nramp_angle_deg: 10\nfps: {fps}")
+    np.testing.assert_allclose(found.times_s, np.arange(40) / 30 / factor, atol=1e-6)
+    said = [line for line in load_clip(tmp_path / "a.yaml").warnings if "rescaled" in line]
+    assert len(said) == (factor > 1)
+
+
 def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:
     columns = {"t (s)": T, "x (m)": -FALL, "y (m)": NOISE[1]}
     with pytest.raises(InputError, match=r"falls along \+x, .* write track_up: -x"):
@@ -177,10 +205,12 @@ def test_what_a_track_leaps_to_does_not_hide_which_way_is_up(seed: int, sign: fl
     assert up_from_motion("bend", times, place) == ("up" if sign > 0 else "down")
 
 
-def test_a_depth_alone_is_asked_whether_it_rises_or_sinks(tmp_path: Path):
+def test_a_way_alone_is_asked_whether_it_rises_or_sinks(tmp_path: Path):
     """What sinks faster and faster, by its depth, would be taken for what rises."""
     depth = 0.02 + 0.3 * T**2 / (0.2 + T)
-    columns, keys = {"time_s": T, "depth_m": depth + NOISE[0]}, "scenario: liquid"
+    columns, keys = {"time_s": T, "way_m": depth + NOISE[0]}, "scenario: liquid"
+    told = observed(tmp_path, {"time_s": T, "depth_m": depth + NOISE[0]}, keys)
+    assert told.position_m[0, 1, -1] < told.position_m[0, 1, 0]
     with pytest.raises(InputError, match=r"track_y: missing; .* rises if the way points up"):
         observed(tmp_path, columns, keys)
     down = observed(tmp_path, columns, keys + "\ntrack_y: down")

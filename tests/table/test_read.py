@@ -530,7 +530,7 @@ def test_rows_that_were_pasted_again_count_once(again: slice, tmp_path: Path) ->
     "heading", ["Run 1: t (s),Run 1: x (m),Run 1: y (m),Latest: t (s),Latest: x (m),Latest: y (m)",
                 "t (s),x (m),y (m),t (s),x (m),y (m)"])  # fmt: skip
 def test_runs_side_by_side_are_motions_one_after_the_other(heading: str, tmp_path: Path) -> None:
-    """The second is shorter; where nobody names them, times that are the same are of one run."""
+    """The second is shorter; where nobody names them, the same times are of runs of one body."""
     body = [f"{t},{x},{y}," + (f"{t},{2 * x},{y}" if n < 12 else ",,")
             for n, (t, x, y) in enumerate(truth().T)]  # fmt: skip
     table = read(tmp_path, text(heading, body=body))
@@ -539,8 +539,34 @@ def test_runs_side_by_side_are_motions_one_after_the_other(heading: str, tmp_pat
     np.testing.assert_allclose(table.motion(2).position[0, 0], 2 * truth()[1, :12])
     same = [f"{t},{x},{y},{t},{2 * x},{y}" for t, x, y in truth().T]
     if heading.startswith("t"):
+        (tmp_path / "same.csv").write_text(text(heading, body=same))
+        assert read_table(tmp_path / "same.csv").starts == (0, ROWS)
         with pytest.raises(InputError, match="x is given twice"):
-            read(tmp_path, text(heading, body=same))
+            read_table(tmp_path / "same.csv", num_bodies=2)
+
+
+@pytest.mark.parametrize("title", ["unix_ms", "elapsed (ms)", "verstrichen / ms"])
+def test_a_title_in_a_unit_of_time_is_the_time(title: str, tmp_path: Path) -> None:
+    """However uneven the steps are."""
+    ms = np.cumsum(np.random.default_rng(3).integers(20, 50, ROWS))
+    body = [f"{t};{y}" for t, y in zip(ms, truth()[2], strict=True)]
+    table = read(tmp_path, text(f"{title};s (cm)", body=body))
+    np.testing.assert_allclose(table.seconds(None), ms / 1000)
+
+
+def test_the_centre_of_mass_is_no_second_body(tmp_path: Path) -> None:
+    body = [f"{n},{x},{y},{x + 0.1},{y},{n}" for n, (_, x, y) in enumerate(truth().T)]
+    table = read(tmp_path, text(" ,X,Y,XM,YM,Slice", body=body))
+    assert len(table.names) == 1
+    np.testing.assert_allclose(table.position[0, 0], truth()[1])
+
+
+@pytest.mark.parametrize(
+    ("title", "way"), [("depth (cm)", "down"), ("Tiefe / mm", "down"), ("height (cm)", "up"),
+                       ("y (cm)", None)])  # fmt: skip
+def test_a_title_says_which_way_an_upright_axis_counts(title: str, way: str, tmp_path: Path):
+    body = [f"{t};{y}" for t, _, y in truth().T]
+    assert read(tmp_path, text(f"t (s);{title}", body=body)).y_axis == way
 
 
 @pytest.mark.parametrize("late_s", [0.0, 2.0])

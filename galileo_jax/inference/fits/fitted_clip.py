@@ -64,7 +64,8 @@ class FittedClip:
     def rates(self, z: np.ndarray) -> np.ndarray:
         """How fast this clip's parameters change with `z` `[point, joint parameter]`."""
         ahead, back = (self.priors.in_units(z[:, self.column] + s) for s in (RATE_Z, -RATE_Z))
-        return (ahead - back) / (2 * RATE_Z)
+        with np.errstate(invalid="ignore"):  # so far out that both are infinite
+            return (ahead - back) / (2 * RATE_Z)
 
     def search_noise(self, search_sd_m: float) -> float:
         """The noise scale at which the tracker's median error is that."""
