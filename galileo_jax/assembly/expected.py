@@ -187,7 +187,7 @@ def _pendulum(
     x, y = place_m[0], place_m[1]
     length = clip.gravity * (period_s(times_s, x) / (2 * math.pi)) ** 2
     length_sd = LENGTH_SD
-    centre, radius = circle(x, y)
+    centre, radius, _ = circle(x, y)
     angles = np.arctan2(x - centre[0], centre[1] - y)
     angle, angle_sd = float(angles[0]), ANGLE_SD_RAD
     if np.ptp(angles) < WIDE_RAD or not math.isfinite(radius):

@@ -14,6 +14,7 @@ from galileo_jax.clip.declared_track import DeclaredTrack
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.track_noise import told_noise_m
+from galileo_jax.numerics.least_squares import circle
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from galileo_jax.runtime.errors import named
 from galileo_jax.table.track_table import TrackTable
@@ -28,6 +29,7 @@ ASKEW_DEG = 45.0
 
 MOST_SCATTER = 0.3  # of gravity: what scatters more from window to window is no fall
 MOST_OUT_OF_PLANE = 0.1
+ROUND = 0.05  # of its radius: an arc is then known so well that it tells where its middle is
 
 
 def observed_where_finite(
@@ -268,10 +270,14 @@ def swung(of: DeclaredTrack, times: np.ndarray, angle_rad: np.ndarray) -> Observ
 
 
 def check_falls_down(of: DeclaredTrack, observation: Observation) -> None:
-    """Raises `InputError` where what falls or flies does so along another axis than down."""
-    if of.scenario.up_shows != "bend" or observation.position_m.shape[1] != 2:
+    """Raises `InputError` where what falls, flies or hangs does so along another axis than down."""
+    if observation.position_m.shape[1] != 2:
         return
     seen = observation.mask[0]
+    if of.scenario.up_shows == "sag" and seen.sum() > MIN_POINTS:
+        _check_hangs_down(of, observation.position_m[0][:, seen])
+    if of.scenario.up_shows != "bend":
+        return
     times = observation.times_s[seen]
     by_axis = [accelerations(times, one) for one in observation.position_m[0][:, seen]]
     x, y = (float(np.median(one)) if one.size else 0.0 for one in by_axis)
@@ -293,3 +299,15 @@ def check_falls_down(of: DeclaredTrack, observation: Observation) -> None:
     if _sign(by_axis[1]) > 0:
         other = "down" if of.file.track_y != "down" else "up"
         raise of.wrong_key(f"{of.path.name} falls up; write track_y: {other}")
+
+
+def _check_hangs_down(of: DeclaredTrack, place_m: np.ndarray) -> None:
+    """Raises `InputError` where the pivot of an arc `[2, row]` lies aside of it, not above."""
+    arc = circle(*place_m)
+    x, y = place_m.mean(axis=1) - arc.centre
+    if arc.radius_sd < ROUND * arc.radius and abs(x) > abs(y):
+        side, up = ("+x", "-x") if x > 0 else ("-x", "x")
+        raise of.wrong_key(
+            f"{of.path.name} is an arc that hangs along {side}; are x and y swapped? write "
+            f"track_up: {up}"
+        )

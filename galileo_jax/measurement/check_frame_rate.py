@@ -6,9 +6,9 @@ In a fall or a flight gravity is what the path bends by. On a ramp with a table 
 (a + d cos A) / sin A, a the acceleration down the ramp, d the deceleration on the table: constant
 friction drops out. Without a table only a / sin A is available, and on the level only d / 1;
 friction lowers the one and is hardly more than 1 in the other, so only values that are too large
-are reported. Of a pendulum it is L (2 pi / T)^2 with the declared thread L. Effects that were not
-declared change gravity by tens of per cent, a wrong frame rate by the square of its factor. Only
-large factors are therefore reported.
+are reported. Of a pendulum it is L (2 pi / T)^2 with the thread L, declared or its arc's radius.
+Effects that were not declared change gravity by tens of per cent, a wrong frame rate by the square
+of its factor. Only large factors are therefore reported.
 """
 
 import math
@@ -20,7 +20,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
-from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import circle, least_squares, polynomial
 from galileo_jax.numerics.periodogram import period_s
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
@@ -35,6 +35,8 @@ LEAST_SHARE = 1 / PIXELS_FROM**2  # of gravity that rough friction leaves in ano
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 NEAR_FREE = 1.05  # the same of what nothing brakes: a scale is known to some per cent
 COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
+ROUND = 0.05  # of its radius: an arc is then known so well that it tells one
+THREAD_OFF = 0.25  # of its length: a mark may lie beside the bob's middle
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
 CHANCE = 1e-3  # that a path is called no parabola though it is one
 LEVELS_OFF = 4.0  # times what it falls faster by in the end: a drag has made it so little
@@ -133,8 +135,10 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
         return _of_free_body(times, y)
     if times.size < MIN_POINTS:
         return None
-    if clip.thread_m is not None:
-        return _of_pendulum(clip.thread_m, times, x)
+    if scenario.up_shows == "sag":
+        arc = circle(x, y)
+        known = clip.thread_m or (arc.radius if arc.radius_sd < ROUND * arc.radius else None)
+        return None if known is None else _of_pendulum(known, times, x)
     if scenario.is_level or scenario.angle_deg == 0:
         along = np.hypot(*np.array([x - x[0], y - y[0]]))
         slowing = _largest(accelerations(times, -along))  # of friction of 1, hardly of more
@@ -173,6 +177,25 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
         return found
     gravity, sd = -2 * float(parabola.solution[0]), 2 * float(parabola.sds[0])
     return ApparentGravity(gravity, sd=sd, is_parabola=True)
+
+
+def thread_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where a bob's path is an arc of another radius than the thread that is declared."""
+    if clip.thread_m is None or not clip.is_scale_known:
+        return None
+    seen, name = observation.mask[0], observation.names[0]
+    arc = circle(*observation.position_m[0, :2][:, seen])
+    off = abs(arc.radius - clip.thread_m)
+    is_told = arc.radius_sd < ROUND * arc.radius and off > SURE_SDS * arc.radius_sd
+    if not is_told or off < THREAD_OFF * max(arc.radius, clip.thread_m):
+        return None
+    swing_s = period_s(observation.times_s[seen], observation.position_m[0, 0, seen])
+    by_period = clip.gravity * (swing_s / (2 * math.pi)) ** 2
+    return (
+        f"{clip.path}: thread_m: {clip.thread_m:g}, but {name}'s path is an arc of radius "
+        f"{arc.radius:.3g} +- {arc.radius_sd:.1g} m, and its period that of {by_period:.3g} m: "
+        "check thread_m, the scale and what was followed"
+    )
 
 
 def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:

@@ -22,7 +22,7 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.average_rows import with_rows_averaged
-from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt
+from galileo_jax.measurement.check_frame_rate import frame_rate_doubt, speed_doubt, thread_doubt
 from galileo_jax.measurement.in_metres import observed
 from galileo_jax.measurement.infer_radii import told_by_hit, with_walls_in_metres
 from galileo_jax.measurement.infer_ramp import (
@@ -176,6 +176,7 @@ def measure(clip: Clip) -> Measurement:
     doubt = path_doubt(clip, observation)
     if doubt is None and not segments.astray:
         doubt = frame_rate_doubt(clip, whole) or speed_doubt(clip, observation)
+        doubt = doubt or thread_doubt(clip, whole)
     told.say(*map(str, segments.cuts))
     clip = _moving(clip, observation, segments, told)
     if scenario.is_level or clip.scenario == "toss":

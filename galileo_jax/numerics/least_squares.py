@@ -8,6 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+# Of a circle: steps, and by what share of its radius the last one moves it.
+MOST_STEPS, STILL = 30, 1e-6
+FLAT = 1e-9  # of a singular value: points on a line
+
 
 @dataclass(frozen=True)
 class LinearFit:
@@ -94,12 +98,40 @@ def two_lines(points: Float[np.ndarray, "2 point"], fewest: int) -> tuple[Line, 
     return min(splits, key=lambda one: one[0].spread[0] + one[1].spread[0], default=None)
 
 
-def circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
-    """The circle through points `[frame]` by linear least squares: its centre and radius.
+class Circle(NamedTuple):
+    """A circle."""
 
-    Source: Kasa (1976), A circle fitting procedure and its error analysis.
+    centre: tuple[float, float]
+    radius: float  # inf where the points are on a straight line
+    radius_sd: float
+
+
+def circle(x: np.ndarray, y: np.ndarray) -> Circle:
+    """The circle through points `[frame]` of least squared distances from it.
+
+    By Gauss-Newton steps from that of linear least squares, which noise makes smaller.
+
+    Source: Kasa (1976), A circle fitting procedure and its error analysis; Gander, Golub and
+    Strebel (1994), Least-squares fitting of circles and ellipses, BIT 34, 558.
     """
-    design = np.stack([x, y, np.ones_like(x)], axis=1)
-    a, b, c = np.linalg.lstsq(design, x**2 + y**2)[0]
-    square = c + (a**2 + b**2) / 4
-    return (a / 2, b / 2), math.sqrt(square) if square > 0 else math.inf
+    middle = np.array([x.mean(), y.mean()])
+    points = np.stack([x, y]) - middle[:, None]
+    design = np.column_stack([2 * points.T, np.ones_like(x)])
+    a, b, c = least_squares(design, np.sum(points**2, axis=0)).solution
+    found, straight = np.array([a, b, math.sqrt(max(c + a**2 + b**2, 0.0))]), math.inf
+    for _ in range(MOST_STEPS):
+        away = points - found[:2, None]
+        distance = np.hypot(*away)
+        if not distance.min() > 0:
+            return Circle((straight, straight), straight, straight)
+        fit = least_squares(np.column_stack([-(away / distance).T, -np.ones_like(x)]),
+                            found[2] - distance)  # fmt: skip
+        found = found + fit.solution
+        if np.abs(fit.solution).max() < STILL * abs(found[2]):
+            break
+    covariance = np.linalg.pinv(fit.design.T @ fit.design, rcond=FLAT)
+    if np.linalg.matrix_rank(fit.design, tol=FLAT * math.sqrt(len(x))) < len(found):
+        return Circle((straight, straight), straight, straight)
+    variance = float(np.sum(fit.left**2)) / max(len(x) - len(found), 1)
+    centre = float(middle[0] + found[0]), float(middle[1] + found[1])
+    return Circle(centre, abs(float(found[2])), math.sqrt(variance * float(covariance[2, 2])))

@@ -98,9 +98,20 @@ def test_a_declared_rate_rescales_the_times_of_a_table(fps: float, factor: int, 
     """As of a film: 240 a second that are played as 30. A rate near theirs confirms them."""
     columns = {"t (s)": np.arange(40) / 30, "s (m)": WAY}
     found = observed(tmp_path, columns, f"scenario: incline\nramp_angle_deg: 10\nfps: {fps}")
-    np.testing.assert_allclose(found.times_s, np.arange(40) / 30 / factor, atol=1e-6)
+    np.testing.assert_allclose(found.times_s, np.arange(40) / 30 / factor, atol=1e-5)
     said = [line for line in load_clip(tmp_path / "a.yaml").warnings if "rescaled" in line]
     assert len(said) == (factor > 1)
+
+
+@pytest.mark.parametrize(("side", "up"), [(1, "-x"), (-1, "x")])
+def test_an_arc_whose_pivot_lies_aside_says_what_to_declare(side: int, up: str, tmp_path: Path):
+    """As a pendulum whose titles x and y were swapped."""
+    angle = 0.4 * np.cos(9 * T)
+    columns = {"t (s)": T, "x (m)": side * 0.5 * np.cos(angle), "y (m)": 0.5 * np.sin(angle)}
+    with pytest.raises(InputError, match=f"an arc that hangs along .*write track_up: {up}"):
+        observed(tmp_path, columns, "scenario: pendulum")
+    turned = observed(tmp_path, columns, f"scenario: pendulum\ntrack_up: {up}")
+    np.testing.assert_allclose(turned.position_m[0, 1], -0.5 * np.cos(angle), atol=1e-5)
 
 
 def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.check_frame_rate import (
     apparent_gravity,
     frame_rate_doubt,
+    thread_doubt,
 )
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.path_direction import path_doubt
@@ -137,9 +138,11 @@ def test_nonsense_is_not_likely(tmp_path):
     assert doubt is not None and "no usual rate explains that" in doubt and "; likely" not in doubt
 
 
-def table(folder: Path, keys: dict, times: np.ndarray, place: np.ndarray) -> tuple:
+def table(
+    folder: Path, keys: dict, times: np.ndarray, place: np.ndarray, noise_m: float = 0.01
+) -> tuple:
     """A clip of a table in metres and what is seen in it, with errors of 10 mm."""
-    noise = 0.01 * np.random.default_rng(3).standard_normal(place.shape)
+    noise = noise_m * np.random.default_rng(3).standard_normal(place.shape)
     rows = [f"{t},{x},{y}" for t, x, y in zip(times, *(place + noise), strict=True)]
     (folder / "a.csv").write_text("\n".join(["t (s),x (m),y (m)", *rows]) + "\n")
     declared = {"track": "a.csv", "objects": [{"name": "ball", "shape": "sphere"}]} | keys
@@ -189,17 +192,34 @@ def test_eleven_coarse_rows_tell_enough(tmp_path):
     assert doubt is not None and "likely fps: 15" in doubt and "27" in doubt
 
 
+@pytest.mark.parametrize("thread", [{"thread_m": 0.5}, {}], ids=["declared", "by_its_arc"])
 @pytest.mark.parametrize(("rate", "is_said"), [(1.0, False), (0.5, True), (4.0, True)])
-def test_a_pendulum_whose_thread_is_declared(rate, is_said, tmp_path):
+def test_a_pendulum_tells_the_rate(rate, is_said, thread, tmp_path):
     t = np.arange(120) / 60
     angle = 0.3 * np.cos(math.sqrt(9.81 / 0.5) * t)
     place = 0.5 * np.array([np.sin(angle), -np.cos(angle)])
-    keys = {"scenario": "pendulum", "thread_m": 0.5, "track_y": "up"}
-    clip, seen = table(tmp_path, keys, t / rate, place)
+    keys = {"scenario": "pendulum", "track_y": "up", **thread}
+    clip, seen = table(tmp_path, keys, t / rate, place, 1e-3)
     doubt = frame_rate_doubt(clip, seen)
     assert (doubt is not None) == is_said
     if doubt is not None:
         assert re.search("likely fps: (60|59.94)", doubt) and "track_units" not in doubt
+
+
+@pytest.mark.parametrize(("thread_m", "is_said"), [(0.5, False), (0.55, False), (1.0, True)])
+def test_an_arc_tells_that_a_thread_is_another(thread_m, is_said, tmp_path):
+    t = np.arange(120) / 60
+    angle = 0.4 * np.cos(math.sqrt(9.81 / 0.5) * t)
+    place = 0.5 * np.array([np.sin(angle), -np.cos(angle)])
+    keys = {"scenario": "pendulum", "thread_m": thread_m, "track_y": "up"}
+    clip, seen = table(tmp_path, keys, t, place, 1e-3)
+    doubt = thread_doubt(clip, seen)
+    assert (doubt is not None) == is_said
+    if doubt is not None:
+        told = re.search(r"radius ([\d.]+) .* that of ([\d.]+)", doubt)
+        assert told is not None
+        arc, by_period = map(float, told.groups())
+        assert arc == pytest.approx(0.5, rel=0.03) and by_period == pytest.approx(0.5, rel=0.05)
 
 
 @pytest.mark.parametrize(("per_metre", "is_said"), [(1.0, False), (100.0, True)])
