@@ -236,7 +236,11 @@ def end_of_slope(observation: Observation) -> int | None:
 
 
 def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
-    """`size_m` by name of the objects that have none; what is tracked is their centres."""
+    """`size_m` by name of the objects that have none; what is tracked is their centres.
+
+    Raises:
+      InputError: two that hit each other are nearer then than their sizes allow.
+    """
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     halves = [extents(item) if item.size_m else (None, None) for item in clip.objects]
     lengths = [half[0] for half in halves]
@@ -244,7 +248,14 @@ def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[floa
         apart, pair = distance_at_hit(observation, k), lengths[k : k + 2]
         if apart is not None and None in pair:
             known = sum(length for length in pair if length is not None)
-            share = max((apart - known) / pair.count(None), MIN_SIZE_M / 2)
+            share = (apart - known) / pair.count(None)
+            if share < MIN_SIZE_M / 2:
+                both = [item.name for item in clip.objects[k : k + 2]]
+                raise InputError(
+                    f"{clip.path}: objects: size_m: null of {' or '.join(both)}, and their paths "
+                    f"do not show it: at the hit they are {apart:.3g} m apart; write size_m, and see "
+                    f"whether both are followed: galileo track {clip.source or clip.path}"
+                )
             lengths[k : k + 2] = [share if length is None else length for length in pair]
     heights = [
         _height(observation, k, angle) if half[1] is None else half[1]

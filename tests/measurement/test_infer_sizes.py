@@ -8,6 +8,7 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
+from galileo_jax.runtime.errors import InputError
 
 ANGLE = math.radians(20.0)
 LENGTHS, HEIGHTS = (0.066, 0.058), (0.079, 0.073)
@@ -91,6 +92,19 @@ def test_known_sizes_are_left_alone(tmp_path: Path) -> None:
     sizes = ("[0.066, 0.05, 0.079]", "[0.058, 0.05, 0.073]")
     measured = measure(load_clip(write_track(tmp_path, sizes)))
     assert not measured.inferred and not measured.remarks
+
+
+def test_two_that_pass_through_each_other_have_no_size(tmp_path: Path) -> None:
+    """As where the tracker changed one for the other."""
+    path = write_track(tmp_path, ("null", "null"))
+    table = tmp_path / "hit.csv"
+    title, *rows = (line.split(",") for line in table.read_text().splitlines())
+    at = title.index("object2_x_m")
+    for row in rows:
+        row[at] = f"{float(row[at]) - sum(LENGTHS) / 2 - 0.002:.6f}"
+    table.write_text("\n".join(map(",".join, [title, *rows])) + "\n")
+    with pytest.raises(InputError, match=r"size_m: null of object1 or object2.*do not show it: at"):
+        measure(load_clip(path))
 
 
 def test_what_stirs_before_the_hit_was_not_hit_then(tmp_path: Path) -> None:
