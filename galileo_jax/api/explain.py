@@ -89,10 +89,11 @@ class Explanation:
     @cached_property
     def paragraph(self) -> str:
         """The result in the words of a lab report."""
-        objects = self.fit.measurements[0].clip.objects
-        shapes, names = [item.shape for item in objects], [item.name for item in objects]
+        clip = self.fit.measurements[0].clip
+        shapes, names = ([getattr(item, key) for item in clip.objects] for key in ("shape", "name"))
+        rolls = [item.roll_inertia is not None for item in clip.objects]
         found = None if self.diagnosis is None else self.diagnosis.document
-        return paragraph(self.fit.result, self.check_document, found, shapes, names)
+        return paragraph(self.fit.result, self.check_document, found, shapes, names, rolls)
 
     @property
     def check_document(self) -> dict[str, Any]:

@@ -70,8 +70,11 @@ def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
     return found
 
 
-def fit_table(found: "Fit", truth: Mapping[str, float]) -> str:
-    """What the user asked for, in a few lines; with a column for the truth if it is known."""
+def fit_table(found: "Fit", truth: Mapping[str, float], is_asked: bool = False) -> str:
+    """What the user asked for, in a few lines; with a column for the truth if it is known.
+
+    `is_asked`: whether what is missing has been asked already.
+    """
     from galileo_jax.inference.per_mass import SUFFIX
     from galileo_jax.report.fit_text import error_text, fit_quality
     from galileo_jax.results.shown import shown, shown_parameters, unit_text
@@ -91,4 +94,4 @@ def fit_table(found: "Fit", truth: Mapping[str, float]) -> str:
             known = f"   not determined by this clip: anything in {interval}"
         lines.append(f"{name:<18}{true:>10}{known}")
     lines.append(f"{error_text(result['error'])}; {result['status']}")
-    return "\n".join([*lines, *fit_quality(result)])
+    return "\n".join([*lines, *fit_quality(result, is_asked)])

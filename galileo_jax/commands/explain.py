@@ -63,7 +63,7 @@ def main(argv: Sequence[str]) -> None:
             _bundle_failure(files, said, to, words, error)
         raise
     print(_filled(found.paragraph))
-    print(f"\n{fit_table(found.fit, truth)}")
+    print(f"\n{fit_table(found.fit, truth, is_asked=True)}")
     notes_on(found.fit, out)
     command.say(", ".join(map(str, found.files)))
     if is_bundled:

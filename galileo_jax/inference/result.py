@@ -286,8 +286,10 @@ def _ratios(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, A
     ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
     derived = {}
     for name, values in ratios.items():
-        # Of two masses that nothing determines.
-        prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
+        # Of two masses that nothing determines but what is declared of them.
+        pair = re.findall(r"\d+", name) or ["1", "2"]
+        priors = [trials.parameters[trials.names.index(f"m{number}")].prior for number in pair]
+        prior_sd = float(np.hypot(*(prior.sd for prior in priors)))  # pyright: ignore
         logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
         entry = summary_of(posterior, values)

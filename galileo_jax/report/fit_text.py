@@ -163,8 +163,11 @@ def distance_text(error: Mapping[str, Any]) -> str:
     return f"{said}, in {frames}." if frames else f"{said}."
 
 
-def fit_quality(result: Mapping[str, Any]) -> list[str]:
-    """How near the fit comes, what it leaves, and what to do where that is too much: sentences."""
+def fit_quality(result: Mapping[str, Any], is_asked: bool = False) -> list[str]:
+    """How near the fit comes, what it leaves, and what to do where that is too much: sentences.
+
+    `is_asked`: whether what is missing has been asked already.
+    """
     near = distance_text(result["error"])
     said = [near] if near else []
     if "imperfections" in result:
@@ -174,7 +177,7 @@ def fit_quality(result: Mapping[str, Any]) -> list[str]:
     said += map(pull_text, result.get("pulls", []))
     if result.get("no_verdict"):
         return [*said, f"{result['no_verdict']}."]
-    if fits(result):
+    if fits(result) or is_asked:
         return said
     words = shlex.join(result["clips"])
     return [

@@ -27,11 +27,13 @@ def paragraph(
     diagnosis: Mapping[str, Any] | None = None,
     shapes: Sequence[str] = (),
     names: Sequence[str] = (),
+    rolls: Sequence[bool] = (),
 ) -> str:
     """What was measured, how well the model follows it, what is missing, what could not be seen.
 
     Of result.json, of compare.json of the model without what was found missing, and, where
-    something is, of diagnosis.json; `shapes` and `names`: of the objects, as declared.
+    something is, of diagnosis.json; `shapes`, `names` and whether they roll: of the objects, as
+    declared.
     """
     entries = {
         name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO
@@ -51,6 +53,8 @@ def paragraph(
     status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
     model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
     near, found = ", ".join(nearness(result["error"])), result.get("imperfections")
+    open_ones = [name for name in entries if name not in known]
+    rolled = {f"k{number}" for number, one in enumerate(rolls, start=1) if one}
     is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [
         *(f"Check first: {one}." for one in result.get("impossible", ())),
@@ -58,7 +62,8 @@ def paragraph(
         _frictions(known, who, shapes),
         *_ratios(known, who),
         _values(rest),
-        _unknown([name for name in entries if name not in known], known),
+        _rolled([name for name in open_ones if name in rolled], who),
+        _unknown([name for name in open_ones if name not in rolled], known),
         f"The model{model} follows the motion to {near}." if near else "",
         *(imperfection_text(found, result["error"]) if found else []),
         _verdict(result, check, diagnosis),
@@ -115,6 +120,14 @@ def _frictions(known: Mapping[str, Any], who: Callable[[str], str], shapes: Sequ
     return sentence(", ".join(parts)) if parts else ""
 
 
+def _rolled(frictions: Sequence[str], who: Callable[[str], str]) -> str:
+    """Of bodies that roll, whose friction is not known."""
+    if not frictions:
+        return ""
+    bodies = listed([who(name.removeprefix("k")) for name in frictions])
+    return sentence(f"{bodies} rolled without slipping, so that friction does not show")
+
+
 def _ratios(known: Mapping[str, Any], who: Callable[[str], str]) -> list[str]:
     """How heavy the bodies are beside each other."""
     return [
@@ -137,6 +150,8 @@ def _called(name: str) -> str:
     """A parameter in a phrase without an article."""
     if name.endswith(SUFFIX):
         return f"{_words(name.removesuffix(SUFFIX))} over the mass"
+    if RATIO.fullmatch(name):
+        return f"ratio of the masses {meaning(name)}"
     return meaning(name) or _words(name)
 
 

@@ -88,9 +88,9 @@ def contact_push(seen: Seen) -> Patterns | None:
 
 @_term("the friction coefficient varies by {size} along the way", "1", lambda _: 0.005, 3.0)
 def friction_roughness(seen: Seen) -> Patterns | None:
-    """Friction that varies along the way, as on every board; none of what rests."""
+    """Friction that varies along the way, as on every board; none of what rests, or rolls."""
     motion = seen.motion
-    if motion is None or not motion.moves.any():
+    if motion is None or not motion.moves.any() or all(seen.scene.rolls or (False,)):
         return None
     return along_path(deviations(motion, ROUGH_LENGTH_M, 1.0), motion)
 

@@ -47,6 +47,14 @@ def test_a_block_whose_friction_is_known_and_nothing_is_missing():
     )
 
 
+def test_of_a_ball_that_rolls_it_is_said_why_friction_is_not_known():
+    known = result(k1=entry(0.5, 0.3, identified=False), start_speed=entry(1.0, 0.1, "m/s"))
+    said = paragraph(known, CHECK, None, ["sphere"], ["marble"], [True])
+    assert "The ball rolled without slipping, so that friction does not show. " in said
+    assert "determine" not in said
+    assert "This clip does not determine the friction" in paragraph(known, CHECK, None, ["sphere"])
+
+
 @pytest.mark.parametrize(
     ("names", "one", "other"),
     [(["object1", "object2"], "The block", "object 2"), (["cart", "block"], "Cart", "block"),

@@ -216,7 +216,11 @@ def test_says_why_a_parameter_is_not_told(tmp_path):
 )
 def test_chi2_is_put_in_words(chi2, is_noise, said):
     error = {"chi2_per_dof": chi2, "explained_by_noise": is_noise}
-    assert said in " ".join(fit_quality({"error": error, "clips": ["clip.mp4"]}))
+    result = {"error": error, "clips": ["clip.mp4"]}
+    assert said in " ".join(fit_quality(result))
+    assert "galileo" not in " ".join(fit_quality(result, is_asked=True)).replace(
+        "galileo compare tests", ""
+    )
 
 
 def test_a_misfit_of_a_nuisance_alone_is_put_in_words():
