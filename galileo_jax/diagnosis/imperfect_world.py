@@ -67,7 +67,8 @@ class ImperfectWorld:
 
     def verdict(self) -> Verdict:
         """The verdict on its table."""
-        is_friction = self.pushing is None
+        scenes = [one.model.scene.surroundings for one in self.judge.trials.problems]
+        is_friction = self.pushing is None and not any(all(one.rolls or (False,)) for one in scenes)
         sure = without_a_name(self.comparison, self.table, is_friction)
         sure = sure or law_verdict(self.table, self.judge.decisive)
         if sure is not None:

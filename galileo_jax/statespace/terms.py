@@ -88,9 +88,12 @@ def contact_push(seen: Seen) -> Patterns | None:
 
 @_term("the friction coefficient varies by {size} along the way", "1", lambda _: 0.005, 3.0)
 def friction_roughness(seen: Seen) -> Patterns | None:
-    """Friction that varies along the way, as on every board; none of what rests, or rolls."""
+    """Friction that varies along the way, as on every board; none of what rests.
+
+    Of what rolls it is the resistance to rolling that varies.
+    """
     motion = seen.motion
-    if motion is None or not motion.moves.any() or all(seen.scene.rolls or (False,)):
+    if motion is None or not motion.moves.any():
         return None
     return along_path(deviations(motion, ROUGH_LENGTH_M, 1.0), motion)
 
