@@ -62,9 +62,9 @@ TEMPLATES = {
     "only_a_form:name": "{hypothesis}, a form without a name, is {log_odds_behind:times} as "
     "probable as {rival}, the best effect with a name.",
     # Of rivals.
-    "contested": "{rival} explains the data, too: {first} is {log_odds_behind:apart} as probable "
+    "contested": "{second} explains the data, too: {first} is {log_odds_behind:apart} as probable "
     "as {second}; {least_log_odds:times} would be needed to decide.",
-    "less_probable": "{rival} explains the data, too: {first} is {log_odds_behind:apart} as "
+    "less_probable": "{second} explains the data, too: {first} is {log_odds_behind:apart} as "
     "probable as {second}; {least_log_odds:times} decide.",
     "contested_together": "{hypothesis} is {log_odds_behind:times} as probable as all other "
     "explanations together ({others} first); {least_log_odds:times} would be needed to decide.",

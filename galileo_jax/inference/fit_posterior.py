@@ -98,7 +98,7 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
 
 
 def two_solutions(trials: JointProblem, fit: GradientFit, draws: np.ndarray) -> str | None:
-    """One line where several valleys share the posterior: what differs most; None where one has it.
+    """One line where several valleys share the posterior: what differs most; else None.
 
     That is counted in standard deviations of the more certain of both; `draws` `[draw, parameter]`
     are the posterior's.
@@ -113,14 +113,16 @@ def two_solutions(trials: JointProblem, fit: GradientFit, draws: np.ndarray) -> 
     far = np.where(wanted, np.ptp(z, axis=0) / np.maximum(sds.min(axis=0), 1e-9), 0.0)
     i = int(np.argmax(far))
     values = [trials.theta(one.z, one.free)[i] for one in every]
-    told = " or ".join(
-        f"{value:.3g} ({share:.0%})" for value, share in zip(values, shares(fit), strict=True)
-    )
+    shown = [f"{value:.3g}" for value in values]
+    if len(set(shown)) == 1:  # they differ in what nobody asked for
+        return None
+    each = zip(shown, shares(fit), strict=True)
+    told = " or ".join(f"{value} ({share:.0%})" for value, share in each)
     low, high = np.quantile(draws[:, i], [0.025, 0.975])
     inside = sum(low <= value <= high for value in values)
     contains = "contain them all" if inside == len(every) else f"contain {inside} of them"
     return (
-        f"{len(every)} solutions explain the clip about equally well: {trials.names[i]} {told}; "
+        f"{len(every)} solutions explain the clip: {trials.names[i]} {told}; "
         f"the intervals {contains}"
     )
 

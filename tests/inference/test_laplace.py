@@ -64,3 +64,10 @@ def test_one_valley_has_all_draws():
     draws = posterior["restitution"].ravel()
     assert draws.mean() == pytest.approx(0.94, abs=0.001)
     assert two_solutions(Plain(), found, posterior.flat()) is None  # pyright: ignore
+
+
+def test_two_valleys_that_differ_in_what_nobody_asked_for_are_not_told():
+    other = fit_at([0.9401, 0.5, 0.0], [0.001, 1.0, 1.0], -2.0)
+    found = fit_at([0.94, 0.5, 5.0], [0.001, 1.0, 1.0], 0.0, beside=(other,))
+    every = laplace_posterior(Plain(), found, 0).flat()  # pyright: ignore
+    assert two_solutions(Plain(), found, every) is None  # pyright: ignore
