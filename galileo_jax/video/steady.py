@@ -29,6 +29,7 @@ LEAST_SLOPE = 2.0  # grey levels per pixel: below, noise and coding hide it
 TUKEY = 4.7  # standard deviations at which a pixel no longer counts
 MOST_STEPS, STILL_PX = 12, 0.005
 ALIKE = 0.6  # of the pixels: where fewer agree, what stands still is not found
+DIMMED = np.log(2.0)  # of a picture's contrast: what is paler, as fog, shows something else
 LEFT = 0.5  # of the first picture's pixels: when fewer are seen, the camera pans away
 GLIMPSES, KNOWN = 16, 0.5  # pictures that tell whether a camera moves; of how many they must
 # Of the small pictures, px: how well their corners are known, and by what rms a camera moves; less
@@ -63,7 +64,9 @@ class Glimpses:
         own = used[:: self._every][: len(self.kept)]
         found = list(to_first(one for one, is_used in zip(self.kept, own, strict=True) if is_used))
         known = [one for one in found if one is not None]
-        return len(known) > KNOWN * len(found) and _is_a_cameras(known, self.kept[0].shape)
+        return len(known) > KNOWN * len(found) and _is_a_cameras(
+            np.array(known), self.kept[0].shape
+        )
 
 
 def small(grey: np.ndarray) -> np.ndarray:
@@ -109,11 +112,11 @@ def drawn(pictures: Iterable[np.ndarray], homographies: Homographies) -> Iterato
 
 
 def displacements_px(
-    homographies: Sequence[Homography] | Homographies, shape: tuple[int, ...]
+    homographies: Homographies, shape: tuple[int, ...]
 ) -> Float[np.ndarray, "picture place 2"]:
     """Of places evenly over pictures of a shape `(height, width)`."""
     places = _grid(shape)
-    there = np.stack(homographies) @ places
+    there = homographies @ places
     return np.moveaxis(there[:, :2] / there[:, 2:] - places[:2], 1, 2)
 
 
@@ -124,7 +127,7 @@ def _grid(shape: tuple[int, ...]) -> Float[np.ndarray, "3 place"]:
     return np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
 
 
-def _is_a_cameras(homographies: Sequence[Homography], shape: tuple[int, ...]) -> bool:
+def _is_a_cameras(homographies: Homographies, shape: tuple[int, ...]) -> bool:
     """Whether they are as large as a moving camera's, and not unlike them."""
     off = displacements_px(homographies, shape)
     x, y, one = _grid(shape)
@@ -146,7 +149,7 @@ class _Still(NamedTuple):
 
 def _pyramid(picture: np.ndarray) -> list[np.ndarray]:
     """The picture, smoothed, and smaller ones."""
-    levels = [picture.astype(np.float32)]
+    levels: list[np.ndarray] = [picture.astype(np.float32)]
     for _ in range(LEVELS - 1):
         levels.append(cv2.pyrDown(levels[-1]))
     return [cv2.GaussianBlur(level, (0, 0), BLUR_PX) for level in levels]
@@ -209,29 +212,30 @@ def _fitted(still: _Still, picture: np.ndarray, homography: Homography) -> tuple
     That is inf where too little of what stands still is seen, or agrees.
     """
     height, width = picture.shape
-    unit, sd_px = _unit(picture.shape), np.inf
+    unit, sd_px, light = _unit(picture.shape), np.inf, np.zeros(2)
     for _ in range(MOST_STEPS):
         x, y, w = unit @ homography @ still.places
-        x, y = x / w, y / w
+        x, y = (one / np.where(w > 0, w, np.inf) for one in (x, y))
         inside = (w > 0) & (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
         design = still.design[inside]
         if len(design) < max(2 * design.shape[1], LEFT * len(inside)):
             return homography, np.inf
-        places = (one[inside].astype(np.float32)[None] for one in (x, y))
-        there = cv2.remap(picture, *places, cv2.INTER_LINEAR)[0]
-        off = (there - still.values[inside]) / still.sd[inside]
+        own = np.stack([x[inside], y[inside]], axis=1).astype(np.float32)[:, None]
+        there = cv2.remap(picture, own, None, cv2.INTER_LINEAR)[:, 0]  # pyright: ignore
+        off = (there - still.values[inside]) / still.sd[inside] - design[:, 8:] @ light
         size = max(1.0, 1.4826 * float(np.median(np.abs(off - np.median(off)))))
         weight = np.maximum(1 - (off / (TUKEY * size)) ** 2, 0.0) ** 2
         weighed = design * weight[:, None]
         normal = weighed.T @ design
         try:
-            step = np.linalg.solve(normal, weighed.T @ off)[:8]
+            step, lighter = np.split(np.linalg.solve(normal, weighed.T @ off), [8])
             homography = homography @ np.linalg.inv(np.append(step, 0.0).reshape(3, 3) + np.eye(3))
             sd_px = size * _corner_sd(normal, height / width) * width / 2
         except np.linalg.LinAlgError:
             return homography, np.inf
-        homography = homography / homography[2, 2]
-        sd_px = sd_px if np.mean(weight > 0) > ALIKE else np.inf
+        homography, light = homography / homography[2, 2], light + lighter
+        is_alike = np.mean(weight > 0) > ALIKE and abs(np.log(max(1 + light[0], 1e-9))) < DIMMED
+        sd_px = sd_px if is_alike else np.inf
         if np.abs(step).max() * width / 2 < STILL_PX:
             break
     return homography, sd_px
@@ -242,5 +246,5 @@ def _corner_sd(normal: Float[np.ndarray, "10 10"], height: float) -> float:
     corners = np.array([[-1, 1, 1, -1], [-height, -height, height, height], [1, 1, 1, 1]])
     covariance, ones, none = np.linalg.inv(normal)[:8, :8], np.ones(4), np.zeros(4)
     both = _slopes(ones, none, corners), _slopes(none, ones, corners)
-    variance = sum(np.einsum("ci,ij,cj->c", one, covariance, one) for one in both)
-    return float(np.sqrt(np.max(variance)))
+    variance = np.max(sum(np.einsum("ci,ij,cj->c", one, covariance, one) for one in both))
+    return float(np.sqrt(variance)) if variance > 0 else np.inf

@@ -60,7 +60,7 @@ def filmed(camera: list[np.ndarray], box_px: int = 24, noise: float = 2.0) -> li
 
 def off_px(found: list, camera: list[np.ndarray]) -> float:
     """By how much the places of pictures are off in the first, at most."""
-    both = steady.displacements_px([f @ one for f, one in zip(found, camera, strict=True)], SHAPE)
+    both = steady.displacements_px(np.array(found) @ np.array(camera), SHAPE)
     return float(np.abs(both).max())
 
 
@@ -70,7 +70,7 @@ SHAPE = (HEIGHT, WIDTH)
 def test_a_hand_is_followed_to_a_tenth_of_a_pixel():
     camera = from_hand()
     found = list(steady.to_first(filmed(camera)))
-    assert np.abs(steady.displacements_px(camera, SHAPE)).max() > 4
+    assert np.abs(steady.displacements_px(np.array(camera), SHAPE)).max() > 4
     assert off_px(found, camera) < steady.TOLD_PX  # at the corners
     middle = np.array([WIDTH / 2, HEIGHT / 2, 1])
     for one, own in zip(found, camera, strict=True):
@@ -80,7 +80,7 @@ def test_a_hand_is_followed_to_a_tenth_of_a_pixel():
 
 def test_a_pan_is_followed_while_half_of_the_first_picture_is_seen():
     camera = [turned(-0.6 * n / COUNT, 0.0, 0.0) for n in range(COUNT)]
-    way = [-steady.displacements_px([one], SHAPE)[0, :, 0].mean() / WIDTH for one in camera]
+    way = [-steady.displacements_px(one[None], SHAPE)[0, :, 0].mean() / WIDTH for one in camera]
     found = list(steady.to_first(filmed(camera)))
     middle = np.array([WIDTH / 2, HEIGHT / 2, 1])
     for one, own, share in zip(found, camera, way, strict=True):
@@ -90,6 +90,15 @@ def test_a_pan_is_followed_while_half_of_the_first_picture_is_seen():
         elif abs(share) > 0.55:
             assert one is None
     assert abs(way[-1]) > 0.55
+
+
+def test_a_camera_that_opens_up_is_followed():
+    """Automatic exposure: brighter by a third in the end, and flatter by a fifth."""
+    camera, pictures = from_hand(), filmed(from_hand())
+    share = np.linspace(0, 1, COUNT)[:, None, None]
+    lit = (1 - 0.2 * share) * np.array(pictures) + 40 * share
+    found = list(steady.to_first(np.clip(lit, 0, 255).astype(np.uint8)))
+    assert off_px(found, camera) < steady.TOLD_PX
 
 
 def glimpsed(pictures: list[np.ndarray]) -> bool:
@@ -161,7 +170,7 @@ def test_a_rendered_hand_is_undone():
     assert np.abs(turns).max() > 4e-3 and not turns[0].any()
     for one, turn in zip(steady.to_first(seen), turns, strict=True):
         both = one @ turned_camera(turn, camera.size_px)
-        assert np.abs(steady.displacements_px([both], (240, 400))[0, 12]).max() < 0.15
+        assert np.abs(steady.displacements_px(both[None], (240, 400))[0, 12]).max() < 0.15
 
 
 @pytest.mark.video
