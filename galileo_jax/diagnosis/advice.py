@@ -8,6 +8,7 @@ from galileo_jax.model.effects.forms import FORM_BY_NAME
 # How another run gets other speeds and places, by how the objects move.
 ANOTHER_RUN = {
     "slide": "release object 1 from another height",
+    "table": "push the object faster, and slower",
     "level": "push the pucks faster, slower and in another direction",
     "fall": "drop the object from another height",
     "flight": "throw the object at another speed and angle",
@@ -20,6 +21,7 @@ LIKE_GRAVITY = {"ramp_angle", "scale_error", "frame_rate", "constant_force"}
 GRAVITY = {
     "slide": "film the same objects at another ramp angle, and measure the angle, a known length "
     "in the picture and the frame rate: an error in any of them acts like a different gravity",
+    "table": f"{BESIDE_THE_CLIP}: an error in either acts like another friction",
     "fall": f"{BESIDE_THE_CLIP}: an error in any of them acts like a different gravity",
     "flight": f"{BESIDE_THE_CLIP}: an error in any of them acts like a different gravity",
 }
@@ -125,4 +127,6 @@ def _motion(scene: Surroundings) -> str:
     """Under which name `ANOTHER_RUN` has it."""
     if scene.is_level:
         return "level"
-    return "slide" if scene.has_surface else free_phase(scene)
+    if scene.has_surface:
+        return "slide" if scene.angle_rad else "table"
+    return free_phase(scene)

@@ -84,7 +84,7 @@ def default_can(clip: Clip, trials: JointProblem) -> dict[str, Any]:
     Not lower and higher where the foot of a board is not known.
     """
     can: dict[str, Any] = {"fps": [clip.fps, 2 * clip.fps, 4 * clip.fps]}
-    if not SCENARIOS[clip.scenario].has_ramp and clip.scenario != "fall":
+    if not SCENARIOS[clip.scenario].is_sloped and clip.scenario != "fall":
         return can
     height = height_m(clip, trials.problems[0])
     low, high = round(0.4 * height, 3), round(2.0 * height, 3)
@@ -164,7 +164,7 @@ def with_next(found: Diagnosis, clip: Clip, trials: JointProblem, seed: int) -> 
 
     Clips as long as the first are predicted, so that nothing is compiled anew.
     """
-    if found.verdict.status != "ambiguous" or not SCENARIOS[clip.scenario].has_ramp:
+    if found.verdict.status != "ambiguous" or not SCENARIOS[clip.scenario].is_sloped:
         return found
     settings = grid(parse_can(default_can(clip, trials)), seed, MOST_SETTINGS)
     seconds = float(trials.problems[0].observation.times_s[-1])

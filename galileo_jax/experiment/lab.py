@@ -216,7 +216,7 @@ def write_clip(
         if known_as(name) in DECLARED
     }
     scenario = declared.get("scenario")  # one that is not known is for `check_clip` to refuse
-    if scenario in SCENARIOS and not SCENARIOS[str(scenario)].has_ramp:
+    if scenario in SCENARIOS and not SCENARIOS[str(scenario)].is_sloped:
         update.pop("ramp_angle_deg", None)
     content = {key: value for key, value in declared.items() if key != "video"}
     content |= {"track": path.name, **update}

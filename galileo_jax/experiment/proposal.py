@@ -58,7 +58,7 @@ def propose(
     start = _start(clip, first, given, angle_deg)
     objects = clip.objects[::-1] if is_swapped else clip.objects
     update = {"fps": fps, "objects": objects}
-    if SCENARIOS[clip.scenario].has_ramp:
+    if SCENARIOS[clip.scenario].is_sloped:
         update["ramp_angle_deg"] = angle_deg
     clip = clip.model_copy(update=update)
     seconds = seconds or max(LONGEST_S, float(first.observation.times_s[-1]))
@@ -82,14 +82,14 @@ def release_m(clip: Clip, problem: Problem) -> float:
 
 def height_m(clip: Clip, problem: Problem) -> float:
     """How high the point under object 1's centre is above the foot when it is released."""
-    if not SCENARIOS[clip.scenario].has_ramp:
+    if not SCENARIOS[clip.scenario].is_sloped:
         return problem.model.scene.surroundings.start_m[0][1]
     return release_m(clip, problem) * math.sin(math.radians(clip.ramp_angle_deg or 90.0))
 
 
 def _check(clip: Clip, given: Setting) -> None:
     scenario = SCENARIOS[clip.scenario]
-    if not scenario.has_ramp:
+    if not scenario.is_sloped:
         without = {"height", "fps"} if clip.scenario == "fall" else {"fps"}
         if beyond := sorted(set(given) - without):
             raise InputError(f"--can: {beyond[0]} has no place in scenario {clip.scenario}")
@@ -110,7 +110,7 @@ def _start(clip: Clip, first: Problem, given: Setting, angle_deg: float) -> np.n
     """Where the objects' centres stand, `[object, 2]`, in the order of the travel."""
     scene = first.model.scene.surroundings
     start = np.array(scene.start_m, float)
-    if not SCENARIOS[clip.scenario].has_ramp:
+    if not SCENARIOS[clip.scenario].is_sloped:
         if "height" in given:
             start[0, 1] = float(given["height"])
         return start

@@ -11,6 +11,7 @@ from tests.ramp_model import HIT, make_surroundings
 
 RAMP = make_surroundings(HIT)
 FALL = replace(make_surroundings(replace(HIT, object2_x_m=None)), has_surface=False)
+TABLE = replace(RAMP, angle_rad=0.0)
 FLIGHT = replace(FALL, moves_in_plane=True, laws=("start_velocity",))
 SPRING = replace(FALL, laws=("spring", "start_velocity"))
 LIQUID = replace(FALL, laws=("liquid", "start_velocity"))
@@ -25,7 +26,13 @@ OPEN = [
 @pytest.mark.parametrize("effects", OPEN)
 @pytest.mark.parametrize(
     ("scene", "says"),
-    [(FALL, "drop"), (FLIGHT, "throw"), (SPRING, "swing"), (LIQUID, "another speed")],
+    [
+        (TABLE, "push the object"),
+        (FALL, "drop"),
+        (FLIGHT, "throw"),
+        (SPRING, "swing"),
+        (LIQUID, "another speed"),
+    ],
 )
 def test_without_a_surface_no_ramp_is_asked_for(scene, says, effects):
     told = " ".join(advice(Verdict("ambiguous", effects), scene, num_clips=1))

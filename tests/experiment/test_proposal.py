@@ -17,7 +17,7 @@ from galileo_jax.experiment.predicted_experiment import predict_experiment
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
 from galileo_jax.experiment.settings import parse_can
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.measurement.measure import Measurement
+from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.runtime.errors import InputError
 from tests.found import diagnosis_of, make_trials
 from tests.oracle_run import HIT, make_run
@@ -199,3 +199,18 @@ def test_no_height_is_proposed_where_the_foot_is_not_known(foot, first, tmp_path
     trials = JointProblem((make_problem(clip, read_observation_csv(path), "auto", ()),))
     can = parse_can(default_can(clip, trials))
     assert next(iter(can)) == first and "angle" in can
+
+
+def test_on_a_level_table_no_slope_can_be_set(tmp_path):
+    times = np.arange(30) / 60
+    rows = [f"{t},{1.5 * t - 0.5 * 2.0 * t**2}" for t in times]
+    path = tmp_path / "level.csv"
+    path.write_text("\n".join(["t (s),x (m)", *rows]))
+    path.with_suffix(".yaml").write_text(
+        "track: level.csv\nscenario: level\nobjects: [{name: block, shape: box}]\n"
+    )
+    measured = measure(load_clip(path))
+    trials = JointProblem((make_problem(measured.clip, measured.observation, "auto", ()),))
+    assert list(default_can(measured.clip, trials)) == ["fps"]
+    with pytest.raises(InputError, match="height has no place in scenario level"):
+        propose(measured.clip, trials, 1.0, {"height": 0.1})

@@ -36,6 +36,11 @@ class Scenario:
         """Whether something carries the objects: a ramp, a table."""
         return self.has_ramp or self.is_level
 
+    @property
+    def is_sloped(self) -> bool:
+        """Whether they slide down a slope, whose angle may be another."""
+        return self.has_ramp and self.angle_deg is None
+
 
 SCENARIOS: Registry[Scenario] = Registry(
     "scenario", "scenarios", "galileo_jax.clip.scenarios.library"
