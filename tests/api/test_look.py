@@ -51,6 +51,16 @@ def test_summary_names_columns_gaps_and_what_is_not_known(tmp_path: Path, capsys
     assert (tmp_path / "a.png").stat().st_size > 0
 
 
+@pytest.mark.parametrize("fps", [30, 60, 240])
+def test_the_step_of_times_that_were_rounded(fps: int, tmp_path: Path) -> None:
+    """0.000, 0.017, 0.033: 60 a second, not 58.8."""
+    times = np.arange(40) / fps
+    rows = [f"{t:.3f};{t**2:.6f}" for t in times]
+    (tmp_path / "a.csv").write_text("\n".join(["t (s);s (m)", *rows]) + "\n")
+    seen = look(tmp_path / "a.csv").seen
+    assert seen is not None and seen.step == pytest.approx(1 / fps, rel=5e-3)
+
+
 def test_what_is_no_file_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         look(tmp_path / "none.csv")
