@@ -89,6 +89,8 @@ def title_of(text: str) -> Title:
     found = BRACKETS.findall(text)
     unit = next((one.lower() for one in found if one.lower() in UNITS), None)
     foreign = [one for one in found if one.lower() not in UNITS]
+    if any("/" in one for one in foreign):  # of a quotient, such as a velocity
+        return Title("", unit=unit)
     words = BRACKETS.sub(lambda m: " " if m[1].lower() in UNITS else f" {m[1]} ", text)
     if ":" in words:  # the data set stands before a colon
         words = words.rsplit(":", 1)[1] or words
@@ -96,7 +98,7 @@ def title_of(text: str) -> Title:
     head, comma, tail = (head, slash, tail) if slash else words.rpartition(",")
     if (slash or comma) and unit is None and tail.strip().lower() in UNITS and head.strip():
         words, unit = head, tail.strip().lower()
-    if "/" in words or "^" in words or any("/" in one for one in foreign):
+    if "/" in words or "^" in words:
         return Title("", unit=unit)
     tokens = [one for one in re.split(r"[\s_\-.]+", words) if one]
     return _from_tokens(tokens, unit)

@@ -554,6 +554,12 @@ def test_a_title_in_a_unit_of_time_is_the_time(title: str, tmp_path: Path) -> No
     np.testing.assert_allclose(table.seconds(None), ms / 1000)
 
 
+def test_a_velocity_alone_is_no_place(tmp_path: Path) -> None:
+    body = [f"{t},{x}" for t, x, _ in truth().T]
+    with pytest.raises(InputError, match="which columns are places is not told by"):
+        read(tmp_path, text("Time (s),Velocity (m/s)", body=body))
+
+
 def test_the_centre_of_mass_is_no_second_body(tmp_path: Path) -> None:
     body = [f"{n},{x},{y},{x + 0.1},{y},{n}" for n, (_, x, y) in enumerate(truth().T)]
     table = read(tmp_path, text(" ,X,Y,XM,YM,Slice", body=body))
