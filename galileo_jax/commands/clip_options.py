@@ -77,7 +77,12 @@ def fit_table(found: "Fit", truth: Mapping[str, float], is_asked: bool = False) 
     """
     from galileo_jax.inference.per_mass import SUFFIX
     from galileo_jax.report.fit_text import error_text, fit_quality
-    from galileo_jax.results.shown import shown, shown_parameters, unit_text
+    from galileo_jax.results.shown import (
+        is_as_declared,
+        shown,
+        shown_parameters,
+        unit_text,
+    )
 
     result: Mapping[str, Any] = found.result
     entries = shown_parameters(result)
@@ -90,6 +95,8 @@ def fit_table(found: "Fit", truth: Mapping[str, float], is_asked: bool = False) 
         known = f"{mean:>10}{sd:>10}   {interval}"
         if f"{name}{SUFFIX}" in result["derived"]:
             known = "   not determined by this clip: only per mass, below"
+        elif is_as_declared(entry):
+            known = f"{mean:>10}{'':>10}   as declared{unit_text(entry)}"
         elif not entry["identified"]:
             known = f"   not determined by this clip: anything in {interval}"
         lines.append(f"{name:<18}{true:>10}{known}")

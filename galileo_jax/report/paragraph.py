@@ -10,7 +10,7 @@ from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.diagnosis_text import noise_text
 from galileo_jax.report.fit_text import imperfection_text, meaning, nearness
 from galileo_jax.report.phrases import listed, sentence
-from galileo_jax.results.shown import shown, shown_parameters
+from galileo_jax.results.shown import is_as_declared, shown, shown_parameters
 
 NUMBERED = re.compile(r"(object ?)?\d*", re.IGNORECASE)  # a name that says nothing
 BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ball"}
@@ -53,7 +53,9 @@ def paragraph(
     status = "" if diagnosis is None else str(diagnosis["verdict"]["status"])
     model = f" with {'a law' if status == 'law' else _all(result)}" if result["effects"] else ""
     near, found = ", ".join(nearness(result["error"])), result.get("imperfections")
-    open_ones = [name for name in entries if name not in known]
+    open_ones = [
+        name for name, entry in entries.items() if name not in known and not is_as_declared(entry)
+    ]
     rolled = {f"k{number}" for number, one in enumerate(rolls, start=1) if one}
     is_in_doubt = status in ("ambiguous", "unknown") and result["effects"]
     said = [

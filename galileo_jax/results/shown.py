@@ -13,6 +13,7 @@ from typing import Any
 
 from galileo_jax.inference.per_mass import per_mass_unit
 
+DECLARED_WIDTH = 0.02  # of a number: no prior that was not declared is so narrow
 MASS = re.compile(r"m\d+")
 HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
@@ -47,6 +48,12 @@ def shown(entry: Mapping[str, Any], key: str = "mean") -> str:
 def interval_text(entry: Mapping[str, Any]) -> str:
     """The ends of the 95 % interval."""
     return f"{shown(entry, 'q025')} to {shown(entry, 'q975')}"
+
+
+def is_as_declared(entry: Mapping[str, Any]) -> bool:
+    """Whether the clip tells nothing of a number that is known all the same, as a mass weighed."""
+    width = entry["q975"] - entry["q025"]
+    return not entry["identified"] and width < DECLARED_WIDTH * abs(entry["mean"])
 
 
 def unit_text(entry: Mapping[str, Any]) -> str:

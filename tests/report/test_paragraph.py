@@ -47,6 +47,12 @@ def test_a_block_whose_friction_is_known_and_nothing_is_missing():
     )
 
 
+def test_a_mass_that_was_weighed_is_not_called_unknown():
+    weighed = {**entry(0.12, 0.0001, "kg"), "identified": False}
+    said = paragraph(result(m1=weighed, k1=entry(0.29, 0.004)), CHECK, None, ["box"])
+    assert "determine" not in said and "mass" not in said
+
+
 def test_of_a_ball_that_rolls_it_is_said_why_friction_is_not_known():
     known = result(k1=entry(0.5, 0.3, identified=False), start_speed=entry(1.0, 0.1, "m/s"))
     said = paragraph(known, CHECK, None, ["sphere"], ["marble"], [True])

@@ -6,7 +6,7 @@ from typing import Any
 from nicegui import ui
 
 from galileo_jax.report.fit_text import distance_text
-from galileo_jax.results.shown import interval_text, shown, unit_text
+from galileo_jax.results.shown import interval_text, is_as_declared, shown, unit_text
 from galileo_jax.studio.panels import parts
 from galileo_jax.studio.results import program_of
 from galileo_jax.studio.tab import Tab
@@ -70,7 +70,8 @@ def _parameter(tab: Tab, one: Mapping[str, Any], values: dict[str, float]) -> No
         ui.label(name).classes("name")
         with ui.element("div").classes("value"):
             ui.label(f"{shown(one)}{unit_text(one)}")
-            interval = interval_text(one) if is_known else "not determined by this clip"
+            told = "as declared" if is_as_declared(one) else "not determined by this clip"
+            interval = interval_text(one) if is_known else told
             ui.label(interval).classes("small soft")
         if one["kind"] != "parameters":
             ui.label("follows from the others").classes("small soft")
