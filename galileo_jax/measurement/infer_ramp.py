@@ -253,8 +253,9 @@ def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[floa
                 both = [item.name for item in clip.objects[k : k + 2]]
                 raise InputError(
                     f"{clip.path}: objects: size_m: null of {' or '.join(both)}, and their paths "
-                    f"do not show it: at the hit they are {apart:.3g} m apart; write size_m, and "
-                    f"see whether both are followed: galileo track {clip.source or clip.path}"
+                    f"do not show it: at the hit they are {apart:.3g} m apart; write size_m, name "
+                    "first what comes down the ramp, and see whether both are followed: "
+                    f"galileo track {clip.source or clip.path}"
                 )
             lengths[k : k + 2] = [share if length is None else length for length in pair]
     heights = [

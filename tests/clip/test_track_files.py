@@ -133,7 +133,8 @@ def test_two_objects_by_their_names(content: str, tmp_path: Path) -> None:
         "scenario: incline", "scenario: ramp"
     )
     path.with_suffix(".yaml").write_text(
-        text + "  - {name: mass_B, shape: box}\n  - {name: first, shape: box, track_name: mass A}\n"
+        text + "  - {name: mass_B, shape: box, size_m: [0.05, 0.05, 0.05]}\n"
+        "  - {name: first, shape: box, size_m: [0.05, 0.05, 0.05], track_name: mass A}\n"
     )
     observation = observation_of(load_clip(path))
     assert observation.names == ("mass_B", "first")
