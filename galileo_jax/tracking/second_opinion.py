@@ -24,7 +24,8 @@ SAME_FRAMES, SAME_PX, SAME_SIZE = 5, 0.5, 0.05
 this, in pixels or by the object's size."""
 INSIDE, BESIDE = 0.5, 2.0
 """A silhouette is the object's if its middle is within this share of its size of where the texture
-is, or if it begins within so many sizes of where that was last seen."""
+is, or, where little is seen of that, of the mark; or if it begins within so many sizes of where
+that was last seen."""
 STAYS_PX, FARTHER = 20.0, 3.0
 """What goes less far may be what is behind a smeared object: it is if a silhouette sets out from
 there and goes so many times as far."""
@@ -107,7 +108,8 @@ def with_silhouette(
         kept[last + 1 :] = False
         if kept.any():
             apart_px = ON_OBJECT * size
-        ways = [way_px(one[both]) for one in (place, found.position_px)] if both.any() else [0.0]
+        is_told = both.sum() >= SAME_FRAMES
+        ways = [way_px(one[both]) for one in (place, found.position_px)] if is_told else [0.0]
         if min(ways) > size > np.ptp(ways):  # they go together, and one of them is off
             rough, other = (
                 _off_smooth_px(one[both], clock[both]) for one in (place, found.position_px)
@@ -196,6 +198,10 @@ def _is_own(
     if both.sum() >= SAME_FRAMES:
         off = np.hypot(*(place[both] - position_px[frames[both]]).T)
         return bool(np.median(off / path.sizes_px[both]) < INSIDE)
+    if start.first_frame in path.frames:  # where it was marked
+        at = path.frames.index(start.first_frame)
+        if length(place[at] - start.point_px) < INSIDE * path.sizes_px[at]:
+            return True
     known = np.flatnonzero(seen)
     nearest = int(known[np.argmin(np.abs(known - frames[0]))])
     is_beside = length(place[0] - position_px[nearest]) < BESIDE * path.sizes_px[0]

@@ -271,3 +271,24 @@ def test_the_thread_that_a_ball_hangs_on_is_not_the_ball(thread_px: int) -> None
     assert len(found.frames) > 25
     off = np.hypot(*(found.places_px - path[found.frames]).T)
     assert off.max() < 2 * RADIUS_PX and np.median(off) < RADIUS_PX / 4
+
+
+def test_of_a_texture_that_is_lost_at_once_the_mark_tells_whose_silhouette_it_is():
+    """A ball that flies twice its size a frame: two places, the second of something else."""
+    time = np.arange(30.0)
+    middle = np.stack([100 + 14 * time, 240 - 32 * time + 1.1 * time**2], axis=1)
+    path, rng = Path([], [], []), np.random.default_rng(2)
+    for index, place in enumerate(middle + 0.1 * rng.standard_normal(middle.shape)):
+        path.append(index, float(index), Part(place, 196.0, place - 7, place + 7))
+    texture = np.full((30, 2), np.nan)
+    texture[1:3] = middle[1], middle[1] - [35.0, 1.0]
+    none = np.where(np.isfinite(texture[:, 0]), 0.0, np.nan)
+    square = none[:, None, None] + np.zeros((30, 2, 2))
+    found = Finished(texture, square + 1e-3 * np.eye(2), square, square, none)
+    outline = Outline((15.0, 15.0), is_round=True)
+    track = with_silhouette(found, Start("ball", (101.0, 241.0), outline), [path], time)
+    assert np.isfinite(track.angle_rad).all()
+    assert np.abs(track.position_px - middle).max() < 0.5
+    assert (track.shifts_px[:, 0, 0] < 1.0).all() and (track.common_px2 == 0).all()
+    beside = with_silhouette(found, Start("ball", (160.0, 241.0), outline), [path], time)
+    assert np.isfinite(beside.angle_rad).sum() == 2
