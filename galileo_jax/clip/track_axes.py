@@ -29,7 +29,6 @@ ASKEW_DEG = 45.0
 
 MOST_SCATTER = 0.3  # of gravity: what scatters more from window to window is no fall
 MOST_OUT_OF_PLANE = 0.1
-ROUND = 0.05  # of its radius: an arc is then known so well that it tells where its middle is
 
 
 def observed_where_finite(
@@ -305,7 +304,7 @@ def _check_hangs_down(of: DeclaredTrack, place_m: np.ndarray) -> None:
     """Raises `InputError` where the pivot of an arc `[2, row]` lies aside of it, not above."""
     arc = circle(*place_m)
     x, y = place_m.mean(axis=1) - arc.centre
-    if arc.radius_sd < ROUND * arc.radius and abs(x) > abs(y):
+    if arc.is_told and abs(x) > abs(y):
         side, up = ("+x", "-x") if x > 0 else ("-x", "x")
         raise of.wrong_key(
             f"{of.path.name} is an arc that hangs along {side}; are x and y swapped? write "

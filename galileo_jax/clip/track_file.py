@@ -138,6 +138,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     times = _times(of, table)
     with named(of.path):
         check_times(times)
+    times, rescaled = _rescaled(of, table, times)
     unit = _unit_of_length(of, table)
     is_px, calibration = unit == "px", table.calibration
     scale = _scale_of(of, calibration) if is_px else None
@@ -181,7 +182,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
         pixels_per_metre=scale,
         origin_px=origin,
         direction=direction,
-        warnings=table.warnings + warnings + lost + said + _doubts(of, table),
+        warnings=table.warnings + warnings + rescaled + lost + said + _doubts(of, table),
     )
 
 
@@ -308,24 +309,26 @@ def _times(of: DeclaredTrack, table: TrackTable) -> np.ndarray:
             f"fps: missing; {of.path.name} {has}; write fps: and the camera's true "
             "frame rate, such as fps: 30.0"
         )
-    times = table.seconds(of.fps)
+    return table.seconds(of.fps)
+
+
+def _rescaled(
+    of: DeclaredTrack, table: TrackTable, times: np.ndarray
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The times of a table that has some, at the declared rate, and what is said of that."""
     if table.is_in_frames or of.fps is None:
-        return times
-    with named(of.path):
-        check_times(times)
-    return at_declared_rate(Clock(times, _frame_rate(times), False), of.fps)[0].times_s
+        return times, ()
+    clock, rate = at_declared_rate(Clock(times, _frame_rate(times), False), of.fps)
+    if abs(of.fps / rate - 1) < AS_DECLARED:
+        return times, ()
+    return clock.times_s, (
+        f"{of.yaml_path}: fps: {of.fps:g} declared, the times in {of.path.name} say {rate:.4g}; "
+        "they are rescaled by it (leave fps out if they are true)",
+    )
 
 
 def _doubts(of: DeclaredTrack, table: TrackTable) -> tuple[str, ...]:
-    if of.fps is not None and not table.is_in_frames:
-        rate = _frame_rate(table.clock)
-        if abs(of.fps / rate - 1) <= AS_DECLARED:
-            return ()
-        return (
-            f"{of.yaml_path}: fps: {of.fps:g} declared, the times in {of.path.name} say "
-            f"{rate:.4g}; they are rescaled by it (leave fps out if they are true)",
-        )
-    if of.fps is None or table.frame_s is None:
+    if not table.is_in_frames or of.fps is None or table.frame_s is None:
         return ()
     if abs(of.fps * table.frame_s - 1) <= 0.01:
         return ()

@@ -35,7 +35,6 @@ LEAST_SHARE = 1 / PIXELS_FROM**2  # of gravity that rough friction leaves in ano
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 NEAR_FREE = 1.05  # the same of what nothing brakes: a scale is known to some per cent
 COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
-ROUND = 0.05  # of its radius: an arc is then known so well that it tells one
 THREAD_OFF = 0.25  # of its length: a mark may lie beside the bob's middle
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
 CHANCE = 1e-3  # that a path is called no parabola though it is one
@@ -137,7 +136,7 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
         return None
     if scenario.up_shows == "sag":
         arc = circle(x, y)
-        known = clip.thread_m or (arc.radius if arc.radius_sd < ROUND * arc.radius else None)
+        known = clip.thread_m or (arc.radius if arc.is_told else None)
         return None if known is None else _of_pendulum(known, times, x)
     if scenario.is_level or scenario.angle_deg == 0:
         along = np.hypot(*np.array([x - x[0], y - y[0]]))
@@ -186,8 +185,8 @@ def thread_doubt(clip: Clip, observation: Observation) -> str | None:
     seen, name = observation.mask[0], observation.names[0]
     arc = circle(*observation.position_m[0, :2][:, seen])
     off = abs(arc.radius - clip.thread_m)
-    is_told = arc.radius_sd < ROUND * arc.radius and off > SURE_SDS * arc.radius_sd
-    if not is_told or off < THREAD_OFF * max(arc.radius, clip.thread_m):
+    is_sure = arc.is_told and off > SURE_SDS * arc.radius_sd
+    if not is_sure or off < THREAD_OFF * max(arc.radius, clip.thread_m):
         return None
     swing_s = period_s(observation.times_s[seen], observation.position_m[0, 0, seen])
     by_period = clip.gravity * (swing_s / (2 * math.pi)) ** 2

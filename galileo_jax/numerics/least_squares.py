@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-# Of a circle: steps, and by what share of its radius the last one moves it.
-MOST_STEPS, STILL = 30, 1e-6
-FLAT = 1e-9  # of a singular value: points on a line
+# Of a circle: steps, by what share of its radius the last one moves it, singular values of points
+# on a line, and the share of its radius to which that is told.
+MOST_STEPS, STILL, FLAT, ROUND = 30, 1e-6, 1e-9, 0.05
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,11 @@ class Circle(NamedTuple):
     radius: float  # inf where the points are on a straight line
     radius_sd: float
 
+    @property
+    def is_told(self) -> bool:
+        """Whether the arc is so round, and so long, that it tells the circle."""
+        return self.radius_sd < ROUND * self.radius
+
 
 def circle(x: np.ndarray, y: np.ndarray) -> Circle:
     """The circle through points `[frame]` of least squared distances from it.
@@ -118,20 +123,20 @@ def circle(x: np.ndarray, y: np.ndarray) -> Circle:
     points = np.stack([x, y]) - middle[:, None]
     design = np.column_stack([2 * points.T, np.ones_like(x)])
     a, b, c = least_squares(design, np.sum(points**2, axis=0)).solution
-    found, straight = np.array([a, b, math.sqrt(max(c + a**2 + b**2, 0.0))]), math.inf
+    found = np.array([a, b, math.sqrt(max(c + a**2 + b**2, 0.0))])
+    line = Circle((math.inf, math.inf), math.inf, math.inf)
     for _ in range(MOST_STEPS):
         away = points - found[:2, None]
         distance = np.hypot(*away)
         if not distance.min() > 0:
-            return Circle((straight, straight), straight, straight)
-        fit = least_squares(np.column_stack([-(away / distance).T, -np.ones_like(x)]),
-                            found[2] - distance)  # fmt: skip
+            return line
+        design = np.column_stack([-(away / distance).T, -np.ones_like(x)])
+        fit = least_squares(design, found[2] - distance)
         found = found + fit.solution
         if np.abs(fit.solution).max() < STILL * abs(found[2]):
             break
-    covariance = np.linalg.pinv(fit.design.T @ fit.design, rcond=FLAT)
-    if np.linalg.matrix_rank(fit.design, tol=FLAT * math.sqrt(len(x))) < len(found):
-        return Circle((straight, straight), straight, straight)
-    variance = float(np.sum(fit.left**2)) / max(len(x) - len(found), 1)
+    if np.linalg.matrix_rank(design, tol=FLAT * math.sqrt(len(x))) < len(found):
+        return line
     centre = float(middle[0] + found[0]), float(middle[1] + found[1])
-    return Circle(centre, abs(float(found[2])), math.sqrt(variance * float(covariance[2, 2])))
+    sd = float(fit.sds[2]) if len(x) > len(found) else math.inf
+    return Circle(centre, abs(float(found[2])), sd)

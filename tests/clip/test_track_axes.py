@@ -114,6 +114,15 @@ def test_an_arc_whose_pivot_lies_aside_says_what_to_declare(side: int, up: str, 
     np.testing.assert_allclose(turned.position_m[0, 1], -0.5 * np.cos(angle), atol=1e-5)
 
 
+def test_times_rounded_to_milliseconds_are_not_rescaled(tmp_path: Path):
+    """Whose middle step says 250 a second where 240 are declared, and are there."""
+    times = np.round(np.arange(120) / 240, 3)
+    columns = {"t (s)": times, "s (m)": 0.3 * times**2}
+    found = observed(tmp_path, columns, "scenario: incline\nramp_angle_deg: 10\nfps: 240")
+    np.testing.assert_allclose(found.times_s, times)
+    assert not any("rescaled" in line for line in load_clip(tmp_path / "a.yaml").warnings)
+
+
 def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:
     columns = {"t (s)": T, "x (m)": -FALL, "y (m)": NOISE[1]}
     with pytest.raises(InputError, match=r"falls along \+x, .* write track_up: -x"):

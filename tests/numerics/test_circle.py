@@ -35,6 +35,11 @@ def test_noise_makes_a_flat_arc_no_rounder(noise):
     assert np.mean(np.abs(radius - 0.5) < 3 * sd) > 0.95
 
 
+def test_three_points_tell_no_error():
+    found = circle(np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, -1.0]))
+    assert found.radius == pytest.approx(1.0) and math.isinf(found.radius_sd) and not found.is_told
+
+
 def test_a_straight_line_is_no_circle():
     x = np.linspace(0, 1, 20)
     found = circle(x, 2 * x)
