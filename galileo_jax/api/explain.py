@@ -20,9 +20,8 @@ from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of, placed
 from galileo_jax.api.track import TrackLike, tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
+from galileo_jax.clip.file_kinds import FILM_SUFFIXES, TRACK_SUFFIXES, is_track, is_yaml
 from galileo_jax.clip.load import (
-    FILM_SUFFIXES,
-    YAML_SUFFIXES,
     find_yaml,
     has_yaml,
     load_clip,
@@ -30,7 +29,6 @@ from galileo_jax.clip.load import (
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.report.paragraph import paragraph
@@ -245,7 +243,7 @@ def _in_folder(folder: Path) -> list[Path]:
     found = [
         path
         for path in sorted(folder.iterdir())
-        if path.is_file() and (is_track(path) or path.suffix.lower() in FILM_SUFFIXES)
+        if path.is_file() and path.suffix.lower() in (*TRACK_SUFFIXES, *FILM_SUFFIXES)
     ]
     if not found:
         raise InputError(f"{folder}: no film and no table in this folder")
@@ -263,8 +261,7 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
         return load(clip)
     path = Path(clip)
     is_elsewhere = path.is_file() and not has_yaml(path) and source_of(path) is not None
-    is_yaml = path.suffix.lower() in YAML_SUFFIXES
-    if is_elsewhere or is_declared(path) or (is_yaml and not path.is_file()):
+    if is_elsewhere or is_declared(path) or (is_yaml(path) and not path.is_file()):
         return load_clip(clip, **_declared_at(path, answers))
     return understand(path)
 

@@ -6,8 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from galileo_jax.clip.file_kinds import is_track, is_yaml
 from galileo_jax.clip.look import Seen, seen_in_table
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import PLACES, read_table
 from galileo_jax.table.track_table import TrackTable
@@ -93,7 +93,7 @@ def look(file: str | Path, *, fps: float | None = None) -> Look:
     path = Path(file)
     if not path.exists():
         raise InputError(f"{path}: no such file")
-    if path.is_dir() or path.suffix.lower() in (".yaml", ".yml"):
+    if path.is_dir() or is_yaml(path):
         raise InputError(f"{path}: a table or a film expected")
     if is_track(path):
         table = read_table(path, fps)

@@ -184,7 +184,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
         return None
     text, choices = "In which unit are its lengths?", (*METRES_PER_UNIT, "px")
     unit, size = _unit_by_gravity(known, answers), max(seen.moved)
-    why = f"it falls as free fall does in {unit}, so that gravity is no measurement"
+    why = f"it falls with about 9.8 m/s^2 in {unit}, and in no other unit"
     if is_open := unit is None:
         unit = "px" if size >= 50 else "m" if size <= 20 else "cm"
         why = f"the table does not say; the way is {size:.4g} long"

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.api.look import Look, look
+from galileo_jax.clip.file_kinds import is_track
 from galileo_jax.clip.load import check_clip, yaml_of
 from galileo_jax.clip.look import LEVEL_DEG, Likely, Seen, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS, Scenario
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import goes_right
 from galileo_jax.clip.track_csv import MAX_STEP_S
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.measurement.segments.rest import rests_of, runs_between
 from galileo_jax.observation.observation import PointPath

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX, LEVELS, Declaration
+from galileo_jax.clip.file_kinds import is_track, is_yaml
 from galileo_jax.clip.load import (
-    YAML_SUFFIXES,
     check_belongs,
     check_clip,
     find_yaml,
@@ -20,7 +20,6 @@ from galileo_jax.clip.load import (
 from galileo_jax.clip.picture_plane import PicturePlane, nearby_planes, picture_plane
 from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile
 from galileo_jax.clip.sources import source_of
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.clip.yaml_update import updated_text
 from galileo_jax.runtime.atomic_write import write_text
@@ -108,7 +107,7 @@ def updated_file(path: Path, content: Mapping[str, Any]) -> tuple[str, tuple[str
 
 def _yaml_path(clip_path: Path) -> Path:
     """The clip's yaml: the one that is there, or the one to create."""
-    is_source = clip_path.is_file() and clip_path.suffix.lower() not in YAML_SUFFIXES
+    is_source = clip_path.is_file() and not is_yaml(clip_path)
     is_new = is_source and not has_yaml(clip_path)
     return clip_path.with_suffix(".yaml") if is_new else find_yaml(clip_path)
 

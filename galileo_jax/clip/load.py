@@ -10,19 +10,19 @@ from pydantic import ValidationError
 from galileo_jax.clip.checks import check_against_source, check_camera, check_frames, check_objects
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.fields import short
+from galileo_jax.clip.file_kinds import YAML_SUFFIXES, is_track, is_yaml
 from galileo_jax.clip.picture_plane import scale_of_rectangle
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.schema_errors import first_problem, unknown_key
 from galileo_jax.clip.sources import source_of
-from galileo_jax.clip.track_file import FileTrack, is_track, read_track
+from galileo_jax.clip.track_file import (
+    FileTrack,
+    read_track,
+)
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
-
-YAML_SUFFIXES = (".yaml", ".yml")
-FILM_SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mts")
-FILM_SUFFIXES += (".wmv", ".3gp")
 
 
 def load_clip(path: str | Path, **overrides: Any) -> Clip:
@@ -121,7 +121,7 @@ def _failing(path: Path, overridden: frozenset[str]) -> Callable[[str, str], NoR
 
 def yaml_of(path: Path) -> Path:
     """The yaml beside a video or track, which need not be there; of a yaml the yaml itself."""
-    if path.suffix.lower() in YAML_SUFFIXES:
+    if is_yaml(path):
         return path
     names = [path.with_suffix(suffix) for suffix in YAML_SUFFIXES]
     return next((name for name in names if name.is_file()), names[0])

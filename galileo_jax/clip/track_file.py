@@ -44,12 +44,6 @@ from galileo_jax.table.track_table import METRES_PER_UNIT, Calibration, TrackTab
 from galileo_jax.table.tracker_trk import is_trk
 from galileo_jax.video.stamps import AS_DECLARED, Clock, at_declared_rate
 
-TRACK_SUFFIXES = (
-    *(".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5"),
-    *(".xlsx", ".xls", ".ods"),
-)
-"""Files taken for a track when given as CLIP; what is in them decides the rest."""
-
 OWN_CSV_SAYS = {
     "track_units": "m",
     "track_y": "up",
@@ -72,11 +66,6 @@ class FileTrack:
     origin_px: tuple[float, float] | None = None  # of a file in pixels; None = unknown
     direction: str = "right"  # of the travel
     warnings: tuple[str, ...] = ()  # doubts, one line each
-
-
-def is_track(path: Path) -> bool:
-    """Whether a file given as CLIP is a track (and no video or yaml)."""
-    return path.suffix.lower() in TRACK_SUFFIXES
 
 
 def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> FileTrack:

@@ -9,9 +9,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from galileo_jax.api.label import label
 from galileo_jax.api.understand import is_declared
+from galileo_jax.clip.file_kinds import is_track
 from galileo_jax.clip.label import updated_file
 from galileo_jax.clip.load import check_clip
-from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError

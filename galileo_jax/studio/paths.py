@@ -5,8 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.clip.load import FILM_SUFFIXES
-from galileo_jax.clip.track_file import is_track
+from galileo_jax.clip.file_kinds import is_film, is_track
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.store import yaml_content
 
@@ -39,7 +38,7 @@ def safe_name(name: str) -> str:
 
 def videos(root: Path) -> dict[str, Path]:
     """The videos that lie in a folder, by name without suffix; links out of it are left out."""
-    return _lying(root, lambda path: path.suffix.lower() in FILM_SUFFIXES)
+    return _lying(root, is_film)
 
 
 def tables(root: Path) -> dict[str, Path]:

@@ -10,8 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
-from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
-from galileo_jax.clip.track_file import is_track
+from galileo_jax.clip.file_kinds import is_film, is_track, is_yaml
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.guard import Guard
@@ -126,7 +125,7 @@ def _source(path: Path) -> tuple[Path, str | None]:
         return path.resolve(), None
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    if path.suffix.lower() in (*YAML_SUFFIXES, *FILM_SUFFIXES):
+    if is_yaml(path) or is_film(path):
         return path.parent.resolve(), path.stem
     if is_track(path):
         return path.parent.resolve(), path.name

@@ -5,9 +5,8 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from galileo_jax.api.look import look
-from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
+from galileo_jax.clip.file_kinds import FILM_SUFFIXES, TRACK_SUFFIXES, YAML_SUFFIXES, is_yaml
 from galileo_jax.clip.schema import ClipFile
-from galileo_jax.clip.track_file import TRACK_SUFFIXES
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.paths import below, check_declared, safe_name
@@ -59,7 +58,7 @@ async def receive(
 def _check(root: Path, part: Path, name: str) -> None:
     """Raises `InputError`, with the name that the person gave it."""
     try:
-        if part.suffix in YAML_SUFFIXES:
+        if is_yaml(part):
             content = read_mapping(part)
             if unknown := [key for key in content if key not in ClipFile.model_fields]:
                 raise InputError(f"{unknown[0]}: unknown key; a clip's yaml expected")

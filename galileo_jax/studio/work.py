@@ -18,7 +18,7 @@ from galileo_jax.api.explain import answered_clips, understood
 from galileo_jax.api.proposed_clip import write_yaml
 from galileo_jax.api.questions import answered
 from galileo_jax.api.understand import Understood, sentence_of
-from galileo_jax.clip.load import YAML_SUFFIXES
+from galileo_jax.clip.file_kinds import YAML_SUFFIXES
 from galileo_jax.clip.schema import Clip
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.clip.load import YAML_SUFFIXES
+from galileo_jax.clip.file_kinds import is_yaml
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.comparison.consensus import FEWEST, consensus
 from galileo_jax.report.class_chart import Agreement
@@ -127,7 +127,7 @@ def _other_declared(own: Mapping[str, str], others: Sequence[Mapping[str, str]])
 def _declared(cell: Cell) -> dict[str, str]:
     """What the yaml of a cell's first clip says that others could say, too; keys with dots."""
     for path in cell.clips[0].paths:
-        if path.suffix.lower() in YAML_SUFFIXES:
+        if is_yaml(path):
             try:
                 return dict(_flat(read_mapping(path)))
             except InputError:  # is said where the clip is loaded

@@ -164,7 +164,7 @@ def _with_places(columns: Columns) -> Columns:
     roles = {1: ("line",), 2: ("x", "y"), 3: ("x", "y", "z")}.get(len(free))
     if roles is None:
         titles = [title for title in columns.heading.titles if title]
-        shown = ", ".join(repr(title[:20]) for title in titles[:8]) or "no titles"
+        shown = ", ".join(repr(title[:40]) for title in titles[:8]) or "no titles"
         raise InputError(
             f"which columns are places is not told by {shown}; titles such as t (s), "
             "x (m), y (m) expected"

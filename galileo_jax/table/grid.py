@@ -11,9 +11,11 @@ from pathlib import Path
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
+from galileo_jax.table.named_lists import named_lists
 from galileo_jax.table.numbers import Rows, is_nothing, is_number
 from galileo_jax.table.spreadsheet import MAX_ROWS, is_spreadsheet, spreadsheet_rows
 from galileo_jax.table.text import content_of, decoded
+from galileo_jax.table.titles import parted_unit
 
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,|])\s*", re.IGNORECASE)  # Excel's own first line
@@ -31,13 +33,15 @@ def read_cells(path: Path) -> Rows:
 
 
 def cells_of(content: bytes) -> Rows:
-    """The rows that are not blank of a text table, or of a spreadsheet's first sheet with numbers.
+    """The rows that are not blank of a text table, named lists, or a spreadsheet's first sheet.
 
     Raises:
       InputError: it is no table, or has too many cells.
     """
     if is_spreadsheet(content):
         return _checked(spreadsheet_rows(content))
+    if (listed := named_lists(content)) is not None:
+        return _checked(listed)
     rows = _split(_lines(decoded(content)))
     is_alone = all(not any(row[1:]) for _, row in rows)
     if is_alone and any(mark in row[0] for _, row in rows for mark in "\t;,"):
@@ -85,7 +89,8 @@ def _fit(lines: list[str], separator: str) -> tuple[float, int, float]:
     good, num_cells, num_numbers = 0, 0, 0
     for row in rows:
         cells = [cell for cell in row if cell]
-        numbers = [cell for cell in cells if is_number(cell) or is_time(cell) or is_nothing(cell)]
+        values = [parted_unit(cell)[0] or cell for cell in cells]
+        numbers = [one for one in values if is_number(one) or is_time(one) or is_nothing(one)]
         least = len(cells) if separator == " " else max(1, len(cells) / 2)  # words have spaces
         num_cells, num_numbers = num_cells + len(cells), num_numbers + len(numbers)
         good += len(cells) <= usual and len(numbers) >= least

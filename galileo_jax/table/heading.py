@@ -15,7 +15,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.grid import COMMENT
 from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_number
-from galileo_jax.table.titles import LENGTHS, Title, is_turning, title_of, unit_of
+from galileo_jax.table.titles import LENGTHS, Title, is_turning, parted_unit, title_of, unit_of
 
 MULTI = "multi:"
 DIGITS = re.compile(r"\s*\d+")  # by which runs are told apart: "s1 (cm)", "s 2 (cm)"
@@ -52,6 +52,7 @@ def split_heading(rows: Rows) -> Heading:
     Raises:
       InputError: there are no numbers, or a row has more cells than titles.
     """
+    rows = _units_in_a_row(rows)
     width = max(len(row) for _, row in rows)
     later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
     words = _word_columns(later, width)
@@ -117,6 +118,27 @@ def split_heading(rows: Rows) -> Heading:
         meanings.append(meaning)
     is_titled = any(one.role for one in meanings)
     return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
+
+
+def _units_in_a_row(rows: Rows) -> Rows:
+    """The rows with units that stand behind every number of a column in a row of their own."""
+    body = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
+    behind: dict[int, str] = {}
+    for n in range(max(map(len, body))):
+        units = {parted_unit(row[n])[1] for row in body if n < len(row) and not is_nothing(row[n])}
+        if len(units) == 1 and (unit := units.pop()):
+            behind[n] = unit
+
+    def bare(row: list[str]) -> list[str]:
+        return [number if (number := parted_unit(cell)[0]) and behind.get(n) else cell
+                for n, cell in enumerate(row)]  # fmt: skip
+
+    found = [(line, bare(row)) for line, row in rows]
+    first = next((n for n, (_, row) in enumerate(rows) if found[n][1] != row), None)
+    if first is None:
+        return rows
+    units = (found[first][0], [behind.get(n, "") for n in range(max(behind) + 1)])
+    return [*found[:first], units, *found[first:]]
 
 
 def one_below_the_other(heading: Heading, num_bodies: int = 1) -> Heading:

@@ -18,7 +18,7 @@ Rows = list[tuple[int, list[str]]]
 NOTHING = frozenset(
     (
         *("", "nan", "-nan", "nan(ind)", "na", "n/a", "n.a.", "<na>", "null", "nil", "none"),
-        *("#n/a", "#nv", "#value!", "#wert!", "#div/0!", "?", "-", "--", "---"),
+        *("#n/a", "#n/d", "#nv", "?", "-", "--", "---"),
         *("n.d.", "n/d", "nd", "k.a.", "s.d.", "missing", "lost"),
     )
 )
@@ -63,8 +63,9 @@ def plain(cell: str) -> str:
 
 
 def is_nothing(cell: str) -> bool:
-    """Whether a cell stands for no number."""
-    return plain(cell).lower() in NOTHING
+    """Whether a cell stands for no number, as a spreadsheet's errors do: #VALUE!, #¿NOMBRE?."""
+    text = plain(cell).lower()
+    return text in NOTHING or (text[0] == "#" and text[-1] in "!?")
 
 
 def is_number(cell: str) -> bool:

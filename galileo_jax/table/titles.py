@@ -41,6 +41,7 @@ RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
 UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
+WITH_UNIT = re.compile(r"([-+\u2212]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?)\s*([^\d\s.,+-]\S*)")
 NUMBERED = re.compile(r"(\D+)(\d+)|([xyz])([a-z])", re.IGNORECASE)  # 'abscisse1', 'xA'
 
 
@@ -65,6 +66,13 @@ def unit_of(text: str) -> str | None:
     return word if word in UNITS else None
 
 
+def parted_unit(cell: str) -> tuple[str, str]:
+    """A number and the unit behind it, '0,033 s'; two empty texts: it is no number with a unit."""
+    match = WITH_UNIT.fullmatch(cell)
+    unit = unit_of(match[2]) if match else None
+    return (match[1], unit) if match and unit else ("", "")
+
+
 def is_no_place(text: str) -> bool:
     """Whether a title says that a column is of another kind: 'Temp. 2', 'U (V)'."""
     words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
@@ -74,7 +82,7 @@ def is_no_place(text: str) -> bool:
 
 def way_up(text: str) -> Literal["up", "down"] | None:
     """Which way a title says that an upright axis points: 'Tiefe/mm'; None: it does not."""
-    words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
+    words = re.split(r"[\s_\-./()\[\]{}]+", text.lower())
     return next((POINTS[word] for word in words if word in POINTS), None)
 
 
@@ -105,6 +113,8 @@ def title_of(text: str) -> Title:
 
 
 def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
+    if len(tokens) > 1 and tokens[-1].lower() in POINTS:  # 'Y m (down)'
+        tokens = tokens[:-1]
     lower = [token.lower() for token in tokens]
     joined = "".join(lower).rstrip("#").replace("number", "").replace("index", "")
     if WORDS.get(joined) in ("frame", "object", "time"):

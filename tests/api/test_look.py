@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -132,3 +133,12 @@ def test_the_yaml_of_what_bounces_has_a_floor(tmp_path: Path) -> None:
     (tmp_path / "made.csv").rename(tmp_path / "ball.csv")
     seen = look(tmp_path / "ball.csv").seen
     assert seen is not None and "floor: true" in seen.yaml
+
+
+@pytest.mark.parametrize("name", ["slide.lvm", "slide", "slide.json", "slide.asc"])
+def test_a_table_of_any_name_is_a_table(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    rows = [[n / 30, 0.5 * n**2] for n in range(20)]
+    text = "\n".join(f"{t:.4f}\t{s:.2f}" for t, s in rows)
+    path.write_text(json.dumps(rows) if name.endswith("json") else text)
+    assert gx.look(path).seen.num_rows == 20

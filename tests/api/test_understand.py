@@ -70,7 +70,7 @@ def test_what_falls_tells_its_unit(metres, unit, tmp_path):
     (one,) = questions(known, {})
     assert (one.default, one.is_open) == (unit, False)
     assert clip_of(known, {}).track_units == unit, "nobody has to be asked"
-    assert f"track_units: {unit}  # it falls as" in yaml_of(known, {}), "but it is said"
+    assert f"track_units: {unit}  # it falls with" in yaml_of(known, {}), "but it is said"
 
 
 def test_a_slope_that_the_path_shows_is_used_and_one_that_it_does_not_is_missing(tmp_path):

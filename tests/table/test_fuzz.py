@@ -1,5 +1,6 @@
 """Whatever the bytes: one line and no more than seconds and a gigabyte, or a table."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,10 @@ from hypothesis import strategies as st
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import read_table
-from tests.table.test_read import FORMS, spreadsheet
+from tests.table.test_read import FORMS, named, spreadsheet, truth
 
 WHOLE = [one.encode() for one in FORMS.values()]
+WHOLE += [json.dumps(one).encode() for one in named(*truth().tolist()).values()]
 
 
 def reads_or_says(path: Path, content: bytes) -> None:

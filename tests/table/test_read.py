@@ -1,6 +1,7 @@
 """One throw, written as many programs and people write it, is read as the same numbers."""
 
 import io
+import json
 import zipfile
 from collections.abc import Callable
 from datetime import date, datetime
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.read import read_table
@@ -235,7 +237,7 @@ def test_thousands_marks(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_in_many_ways(tmp_path: Path) -> None:
-    words = ["", "nan", "n.d.", "-", "NA", "<NA>", "n.a.", "#N/A", "null"]
+    words = ["", "nan", "n.d.", "-", "NA", "<NA>", "n.a.", "#N/D", "#WERT!"]
     body = lines()
     for n, word in enumerate(words):
         body[2 * n] = f"{truth()[0, 2 * n]},{word},{word}"
@@ -569,10 +571,76 @@ def test_the_centre_of_mass_is_no_second_body(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("title", "way"), [("depth (cm)", "down"), ("Tiefe / mm", "down"), ("height (cm)", "up"),
-                       ("y (cm)", None)])  # fmt: skip
+                       ("Y cm (down)", "down"), ("y (cm)", None)])  # fmt: skip
 def test_a_title_says_which_way_an_upright_axis_counts(title: str, way: str, tmp_path: Path):
     body = [f"{t};{y}" for t, _, y in truth().T]
     assert read(tmp_path, text(f"t (s);{title}", body=body)).y_axis == way
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal", "space"), [("\t", ".", " "), (";", ",", " "), (",", ".", "")]
+)
+def test_units_may_stand_behind_every_number(separator, decimal, space, tmp_path: Path) -> None:
+    behind = (f"{space}s", f"{space}cm", f"{space}cm")
+    rows = [
+        separator.join(cell + unit for cell, unit in zip(row.split("|"), behind, strict=True))
+        for row in lines("|", decimal)
+    ]
+    table = read(tmp_path, text(separator.join("txy"), body=rows))
+    check(table)
+    assert table.unit == "cm"
+
+
+def named(t: list[float], x: list[float], y: list[float]) -> dict[str, object]:
+    """Named lists in the ways that programs have them, by what they are."""
+    records = [{"t": one, "pos": {"x": a, "y": b}} for one, a, b in zip(t, x, y, strict=True)]
+    rows = [list(row) for row in zip(t, x, y, strict=True)]
+    return {
+        "lists": {"t": t, "x": x, "y": y, "comment": "a throw"},
+        "records": {"track": records},
+        "rows": rows,
+        "across": {"data": [t, x, y]},
+        "places": {"t": t, "position": [row[1:] for row in rows]},
+        "two bodies": {"t": t, "A": {"x": x, "y": y}, "B": {"x": y, "y": x}},
+    }
+
+
+NAMED = tuple(named([], [], []))
+
+
+@pytest.mark.parametrize("kind", NAMED)
+def test_named_lists_of_json(kind: str, tmp_path: Path) -> None:
+    content = named(*truth().tolist())[kind]
+    table = read(tmp_path, json.dumps(content), "json")
+    check(table)
+    assert table.names == (("A", "B") if kind == "two bodies" else ("object1",))
+
+
+@pytest.mark.parametrize("kind", ["lists", "across", "places", "two bodies"])
+def test_named_arrays_of_matlab(kind: str, tmp_path: Path) -> None:
+    """A dictionary is a structure there."""
+    file = io.BytesIO()
+    savemat(file, named(*truth().tolist())[kind])
+    check(read(tmp_path, file.getvalue(), "mat"))
+
+
+def test_a_rate_and_a_unit_beside_named_lists(tmp_path: Path) -> None:
+    _, x, y = truth().tolist()
+    table = read(tmp_path, json.dumps({"fps": 25, "unit": "cm", "x": x, "y": y}), "json")
+    assert (table.frame_s, table.unit) == (STEP_S, "cm")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [("[[1, [2]], 3]", "no lists of numbers"), ('{"fps": 30}', "no lists of numbers"),
+     (json.dumps([{f"{n}": 1} for n in range(2100)]), "at most 4000000"),
+     ("[" * 900 + "]" * 900, "no lists of numbers"),
+     (b"MATLAB 5.0 MAT-file" + bytes(300), "not a whole MATLAB file"),
+     (b"MATLAB 7.3 MAT-file" + bytes(600), "-v7")],
+)  # fmt: skip
+def test_named_lists_that_cannot_be_read(content: str | bytes, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words):
+        read(tmp_path, content)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 2.0])

@@ -6,8 +6,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from galileo_jax.clip.load import YAML_SUFFIXES
-from galileo_jax.clip.track_file import TRACK_SUFFIXES
+from galileo_jax.clip.file_kinds import TRACK_SUFFIXES, YAML_SUFFIXES
 from galileo_jax.studio.panels import parts
 from galileo_jax.studio.tab import Tab
 
