@@ -10,7 +10,12 @@ import numpy as np
 
 from galileo_jax.api.export import parameter_table
 from galileo_jax.api.motion import Motion, motions_at, replaced
-from galileo_jax.api.track_doubts import taken_as_exact, with_other_angle, with_track_doubts
+from galileo_jax.api.track_doubts import (
+    as_if_rolling,
+    taken_as_exact,
+    with_other_angle,
+    with_track_doubts,
+)
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
@@ -345,7 +350,9 @@ def make_fit(
         result["no_verdict"] = "; ".join(scarce)
     friction = result["parameters"].get("k1", {}).get("mean")
     at_declared = None if "ramp_angle" in result["parameters"] else friction
-    if others := [text for one in measurements if (text := with_other_angle(one, at_declared))]:
+    doubts = [doubt(one, at_declared) for doubt in (with_other_angle, as_if_rolling)
+              for one in measurements]  # fmt: skip
+    if others := [text for text in doubts if text is not None]:
         result["warnings"] = [*result.get("warnings", []), *others]
     if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = taken

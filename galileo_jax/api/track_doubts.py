@@ -20,6 +20,15 @@ leave as much; a track of something else does."""
 MOST_OFF_PERCENT = 5.0
 """Root mean square; tracks that people make by hand are within one or two."""
 
+OF_ROLLING = {
+    "a ball": (2 / 5, "shape: sphere"),
+    "a cylinder": (1 / 2, "shape: cylinder, rolls: true"),
+    "a hollow ball": (2 / 3, "shape: sphere, rolls: 0.667"),
+}
+"""J / (m r^2), and how a yaml declares such a body."""
+
+AS_ROLLING = 0.02  # of k1: so near to that of a body that rolls, as the angle is known
+
 TAKEN = {
     "ramp_angle_deg": "ramp_angle_deg as exact",
     "pixels_per_metre": "pixels_per_metre as known to a thousandth",
@@ -127,6 +136,26 @@ def with_other_angle(measured: Measurement, k1: float | None) -> str | None:
         f"{clip.path}: if the board falls by {way.path_deg:.1f} degrees, as {name}'s path does, k1 "
         f"is {friction:.3f}"
     )
+
+
+def as_if_rolling(measured: Measurement, k1: float | None) -> str | None:
+    """What rolls, if k1 is that of a box which goes down as fast; None where none does.
+
+    Of what rolls down without losses the acceleration is g sin a / (1 + J / (m r^2)), as of a box
+    with the friction coefficient tan a J / (J + m r^2).
+    """
+    clip = measured.clip
+    angle, item = clip.ramp_angle_deg, clip.objects[0]
+    if k1 is None or not angle or item.shape != "box" or not SCENARIOS[clip.scenario].has_ramp:
+        return None
+    for what, (inertia, declared) in OF_ROLLING.items():
+        k_rolling = math.tan(math.radians(angle)) * inertia / (1 + inertia)
+        if abs(k1 / k_rolling - 1) < AS_ROLLING:
+            return (
+                f"{clip.path}: {what} that rolls down {angle:g} degrees is as fast as a box with "
+                f"k1 {k_rolling:.3g}; if {item.name} rolls, write {declared}"
+            )
+    return None
 
 
 def _way_px(measured: Measurement) -> float:

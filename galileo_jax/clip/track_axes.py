@@ -71,6 +71,9 @@ def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | No
         value = np.polyfit(x - x.mean(), y, 2)[0] if np.ptp(x) > 0 else 0.0
     else:
         value = -_sign(accelerations(t, y))
+        has_turned = np.ptp(y) > (1 + BACK) * abs(y[-1] - y[0])
+        if value == 0 and not has_turned:  # it falls no faster in the end
+            value = y[0] - y[-1]
     return None if value == 0 else "up" if value > 0 else "down"
 
 

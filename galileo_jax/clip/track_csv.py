@@ -272,8 +272,8 @@ def check_speed(name: str, times: np.ndarray, position: np.ndarray) -> None:
     usual = float(np.quantile(speed, 0.8))
     if usual > MAX_SPEED_M_S:
         raise InputError(
-            f"{name}: moves at {usual:.3g} m/s; metres and seconds expected; are these "
-            "places in millimetres (divide them by 1000) or pixels?"
+            f"{name}: moves at {usual:.3g} m/s; metres and seconds expected; if these places are "
+            "in centimetres, millimetres or pixels, say so: track_units: cm, mm or px"
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
-from galileo_jax.api.track_doubts import FAR, taken_as_exact, with_track_doubts
+from galileo_jax.api.track_doubts import FAR, as_if_rolling, taken_as_exact, with_track_doubts
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
@@ -51,6 +51,17 @@ def measured() -> Measurement:
 
 def declared(measured: Measurement, **values: object) -> Measurement:
     return replace(measured, clip=measured.clip.model_copy(update=values))
+
+
+@pytest.mark.parametrize(("inertia", "what"), [(0.4, "a ball"), (0.5, "a cylinder")])
+def test_a_box_as_fast_as_what_rolls_may_be_that(measured, inertia: float, what: str) -> None:
+    """Of the acceleration g sin a / (1 + inertia) the friction is that of the box."""
+    angle = math.radians(ANGLE_DEG)
+    k1 = (math.sin(angle) - math.sin(angle) / (1 + inertia)) / math.cos(angle)
+    assert f"{what} that rolls" in (as_if_rolling(measured, k1) or "")
+    assert as_if_rolling(measured, 1.05 * k1) is None
+    ball = declared(measured, objects=(ClipObject(name="object1", shape="sphere"),))
+    assert as_if_rolling(ball, k1) is None
 
 
 def test_half_a_pixel_changes_k1_as_a_steeper_ramp_and_longer_lengths_would(measured) -> None:

@@ -36,6 +36,16 @@ def test_a_fall_by_its_height_or_depth(sign: int, tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.abs(found.across[0, 0]), 1.0)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_falls_at_its_terminal_speed_falls_down(sign: int, tmp_path: Path) -> None:
+    """As a coffee filter, whose acceleration shows at the beginning alone."""
+    terminal, rate = 1.0, 9.81
+    height = 2.0 - terminal / rate * np.logaddexp(rate * T, -rate * T) + NOISE[0]
+    columns = {"t (s)": T, "x (m)": 0 * T, "y (m)": sign * height}
+    found = observed(tmp_path, columns, "scenario: fall")
+    assert found.position_m[0, 1, 0] > found.position_m[0, 1, -1]
+
+
 @pytest.mark.parametrize("declared", ["", "\ntrack_y: down"])
 def test_a_sensor_above_measures_downwards_also_what_bounces(declared: str, tmp_path: Path) -> None:
     times = np.arange(150) / 50

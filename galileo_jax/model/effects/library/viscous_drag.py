@@ -15,6 +15,8 @@ from galileo_jax.model.effects.air import expected_odds
 PRIOR = LogNormal(median=0.3, sd=1.2)
 # Of the size of the air's on a ball at 10 m/s.
 FALL_PRIOR = LogNormal(median=0.03, sd=1.5)
+# Of balls of 3 to 30 mm in anything from water to glycerine: b / m = 9 mu / (2 rho r^2).
+LIQUID_PRIOR = LogNormal(median=0.5, sd=2.0)
 
 
 @register
@@ -22,7 +24,8 @@ class ViscousDrag(Effect):
     name = "viscous_drag"
 
     def parameters(self, scene):
-        prior = PRIOR if scene.has_surface else FALL_PRIOR
+        in_liquid = "liquid" in scene.laws
+        prior = PRIOR if scene.has_surface else LIQUID_PRIOR if in_liquid else FALL_PRIOR
         return (Parameter("viscous_drag", "kg/s", prior, 0.0, "effect", 0.1),)
 
     def odds(self, theta, scene):
