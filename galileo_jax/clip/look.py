@@ -44,6 +44,11 @@ class Likely:
     # whether it comes back up from something below, which a yaml calls `floor`
     bounces: bool = False
 
+    @property
+    def is_throw(self) -> bool:
+        """Whether it is a throw, and nothing else looks like it."""
+        return self.is_clear and self.scenario == "flight"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Seen(Likely):

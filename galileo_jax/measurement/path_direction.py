@@ -67,7 +67,8 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     if is_spring or (scenario.has_ramp and not may_turn):
         path = _turn_between(path, 0.0, 180.0)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
-    if may_turn and apart > NEARER * max(off_axis, sd):
+    is_thrown = scenario.up_shows == "bend" and likely_in_plane(*points).is_throw
+    if may_turn and not is_thrown and apart > NEARER * max(off_axis, sd):
         return OtherWay(declared, path, sd, True)
     known = math.hypot(sd, LEVEL_SD_DEG, clip.ramp_angle_sd_deg)
     is_straight = np.abs(line.across @ away).max() <= STRAIGHT * length
@@ -140,7 +141,13 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
     if clip.scenario not in ("pendulum", "fall") or not seen.any():
         return None
     place = observation.position_m[0, :2][:, seen]
+    likely = likely_in_plane(*place)
     if clip.scenario == "fall":
+        if likely.is_throw:
+            return (
+                f"{clip.path}: {name} goes along {likely.why}, and what falls goes straight down "
+                "(perhaps scenario: flight)"
+            )
         gone = place - place[:, :1]
         across, up = gone[:, int(np.argmax(np.hypot(*gone)))]
         if abs(across) <= abs(up):  # no camera is turned by more
@@ -150,7 +157,6 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
             "what falls goes down: mark the thing that is meant (`--point X Y`), or turn the film "
             "if its camera lay on its side"
         )
-    likely = likely_in_plane(*place)
     if likely.scenario not in ("incline", "fall") or not likely.is_clear:
         return None
     return (

@@ -188,3 +188,17 @@ def test_what_falls_across_is_said_before_its_gravity(tmp_path):
     )
     said = measure(load_clip(tmp_path / "a.yaml")).impossible
     assert said is not None and said.startswith("object1 goes across by")
+
+
+def test_a_throw_that_is_declared_as_a_fall_is_said_before_its_gravity(tmp_path):
+    """Its axes are not turned, though it goes farther across than down."""
+    t = np.arange(25) / 30
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, 25))
+    x, y = np.stack([2.0 * t, 3.4 * t - 4.905 * t**2]) + noise
+    rows = "\n".join(f"{a:.4f},{b:.4f},{c:.4f}" for a, b, c in zip(t, x, y, strict=True))
+    (tmp_path / "a.csv").write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    (tmp_path / "a.yaml").write_text(
+        "track: a.csv\nscenario: fall\nobjects: [{name: object1, shape: sphere}]\n"
+    )
+    said = measure(load_clip(tmp_path / "a.yaml")).impossible
+    assert said is not None and "perhaps scenario: flight" in said
