@@ -18,6 +18,7 @@ STRAIGHT, UNLIKE = 0.98, 0.3  # cosine between the velocities; share of the acce
 FEWEST = 8  # places on either side
 REACHES = (20, FEWEST)  # the shorter not to where it is at rest or struck
 MOST_LEFT = 3.0  # times the stated variance
+STARTS = 5  # to a step, that are tried
 SMEARED = 1  # steps in which the clock changes
 
 
@@ -27,9 +28,13 @@ def rate_change(observation: Observation) -> tuple[int, float] | None:
     None where it does not change.
     """
     path, found = observation.path(), []
+    away = observation.first_away(0)
+    let_go = 0 if away is None else int(np.searchsorted(path.frames, away))
     for at in range(FEWEST, len(path) - FEWEST - SMEARED + 1):
         middle_s = (path.times_s[at - 1] + path.times_s[at]) / 2
         before = _smooth([path[max(at - n, 0) : at] for n in REACHES], middle_s)
+        if before.left >= MOST_LEFT and at < let_go + FEWEST:
+            before = _from_rest(path[max(at - REACHES[0], 0) : at], middle_s)
         after = _smooth([path[at + SMEARED : at + SMEARED + n] for n in REACHES], middle_s)
         if max(before.left, after.left) < MOST_LEFT and (factor := _factor(before, after)):
             both = path[at - before.places : at + SMEARED + after.places]
@@ -63,6 +68,31 @@ def _parabola(path: PointPath, middle_s: float) -> _Parabola:
     sds = np.sqrt(variance * max(left, 1.0) * np.diagonal(fit.inverse))
     (bend, velocity, _), (bend_sd, velocity_sd, _) = fit.solution, sds.tolist()
     return _Parabola(velocity, 2 * bend, velocity_sd, 2 * bend_sd, left, len(path))
+
+
+def _from_rest(path: PointPath, middle_s: float) -> _Parabola:
+    """Of what is at rest until it is let go; its velocity is the acceleration times the time since.
+
+    By Gauss's steps' last slopes, of the place of rest, the acceleration, and when it is let go.
+    """
+    times, place = path.times_s, path.place_m.T
+    starts = np.linspace(times[1], times[-2], STARTS * len(path))
+    since = np.maximum(times - starts[:, None], 0.0)
+    fits = [least_squares(np.column_stack([np.ones_like(s), s**2 / 2]), place) for s in since]
+    best = int(np.argmin([np.sum(fit.left**2) for fit in fits]))
+    acceleration, moved_s = fits[best].solution[1], since[best]
+    size, gone_s = float(np.linalg.norm(acceleration)), middle_s - starts[best]
+    slopes = np.column_stack([np.ones_like(moved_s), moved_s**2 / 2, -size * moved_s])
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    variance = float(np.median(path.variance_m2))
+    count = (len(path) - 2) * place.shape[1] - 1
+    left = float(np.sum(fits[best].left ** 2)) / (count * variance)
+    of_velocity = np.array([0.0, gone_s, -size])
+    scale = variance * max(left, 1.0)
+    velocity_sd = float(np.sqrt(scale * of_velocity @ inverse @ of_velocity))
+    acceleration_sd = float(np.sqrt(scale * inverse[1, 1]))
+    velocity = acceleration * gone_s
+    return _Parabola(velocity, acceleration, velocity_sd, acceleration_sd, left, len(path))
 
 
 def _kinked_left(path: PointPath, variance_m2: float) -> float:
