@@ -34,7 +34,9 @@ NUM_RIGID = 5  # rows of the Jacobian without those of a stretched patch
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
 """How much a patch may be stretched (sd), against noise, grey levels, of a pixel whose neighbours
 have the same."""
-COVERED = 4.0  # noise sigmas: a pixel that differs by more shows something else than the object
+COVERED, FAINT = 4.0, 0.1
+"""Noise sigmas, and contrasts of the object: a pixel that differs by more than both shows something
+else than the object."""
 NEIGHBOURS = (0.1, 0.9)  # bounds of what neighbouring pixels' noise is believed to correlate by
 SETTLED_PX, SETTLED_RAD = 0.01, 3e-4
 """0.005 px at the rim of a 30 px object; smaller steps change nothing."""
@@ -161,7 +163,9 @@ def align(
         pose=pose,
         correlation=float(wb @ a / scale),
         noise=float(noise),
-        covered=float(np.mean(size > COVERED * noise)),
+        covered=float(
+            np.mean(size > max(COVERED * noise, FAINT * abs(gain) * float(np.std(values))))
+        ),
         gain=float(solution[3]),
         weight=weight,
         residual=residual,

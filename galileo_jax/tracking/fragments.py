@@ -1,6 +1,6 @@
 """The pieces of an object's path: a new one begins where it is put right and looks otherwise."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.follower import SAME_PLACE, Follower
-from galileo_jax.tracking.picture import Picture
+from galileo_jax.tracking.picture import Picture, View
 from galileo_jax.tracking.pose import length
 from galileo_jax.tracking.refiner import Velocities, velocities_at
-from galileo_jax.tracking.template import Outline, template_at
+from galileo_jax.tracking.template import Outline, grey, template_at
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Start:
     last_frame: int | None = None  # nor are frames after; None: to the end
     # where somebody has seen it in later frames, in time's order: it is followed on from there
     corrections: "tuple[Start, ...]" = ()
+    view: View = grey  # in which it is looked at
 
     def uses(self, index: int) -> bool:
         """Whether a frame is looked at."""
@@ -40,6 +41,7 @@ class Piece:
     follower: Follower  # with its poses from that frame on
     corrected: tuple[int, ...] = ()  # frames in which somebody has put it right
     turned_rad: float = 0.0  # how far the object had turned when the piece began
+    view: View = grey
 
     @property
     def is_clicked(self) -> bool:
@@ -64,17 +66,18 @@ def follow_on(
     pieces: list[Piece],
     start: Start,
     index: int,
-    before: Picture | None,
-    picture: Picture,
+    before: Mapping[View, Picture] | None,
+    now: Mapping[View, Picture],
     exposure: Exposure,
     beside: Sequence[Follower],
     step: float,
 ) -> None:
     """One frame further; `pieces`, the object's so far, grows where a new one begins.
 
-    `beside` are the other objects, which may hit it; `step` is the time since the frame `before`,
-    in usual steps.
+    `now` and `before` are this frame and the last one, as they are looked at. `beside` are the
+    other objects, which may hit it; `step` is the time since the last frame, in usual steps.
     """
+    picture = now[start.view]
     if not pieces:
         pieces.append(_begun(start, picture, exposure))
     elif (told := next((c for c in start.corrections if c.first_frame == index), None)) is not None:
@@ -83,16 +86,20 @@ def follow_on(
             pieces[-1] = replace(last, corrected=(*last.corrected, index))
             return
         turned = last.turned_rad + float(last.follower.pose[2])
-        begun = _begun(told, picture, exposure)
+        begun = _begun(replace(told, view=start.view), picture, exposure)
         pieces.append(replace(begun, corrected=(index,), turned_rad=turned))
     own = pieces[-1]
     own.follower.is_alone = not beside
     own.follower.fastest_px = max((one.speed_px for one in beside), default=0.0)
-    own.follower.step(before if index > own.first_frame else None, picture, step)
+    last = before[own.view] if before is not None and index > own.first_frame else None
+    own.follower.step(last, picture, step)
 
 
 def keep_apart(
-    pieces: Sequence[Piece], index: int, before: Picture | None, picture: Picture
+    pieces: Sequence[Piece],
+    index: int,
+    before: Mapping[View, Picture] | None,
+    now: Mapping[View, Picture],
 ) -> None:
     """Of two objects at one place the one that is less expected there is sought elsewhere."""
     for one, other in combinations([piece for piece in pieces if index > piece.first_frame], 2):
@@ -100,12 +107,13 @@ def keep_apart(
         # NaN compares False: what is not found is nowhere.
         apart_px = length(pair[0].poses[-1] - pair[1].poses[-1])
         if apart_px < SAME_PLACE * min(follower.size_px for follower in pair):
-            strays, stays = sorted(pair, key=lambda each: -each.off_course_px)
-            strays.again(before, picture, (stays.poses[-1],))
+            strays, stays = sorted((one, other), key=lambda each: -each.follower.off_course_px)
+            last = None if before is None else before[strays.view]
+            strays.follower.again(last, now[strays.view], (stays.follower.poses[-1],))
 
 
 def _begun(start: Start, picture: Picture, exposure: Exposure) -> Piece:
     point = np.array(start.point_px, dtype=float)
-    template = template_at(picture.grey, point, start.outline)
+    template = template_at(picture.grey, point, start.outline, by_edge=start.view is not grey)
     follower = Follower(template, np.array([*point, 0.0]), exposure, picture)
-    return Piece(start.first_frame, start.point_px, follower)
+    return Piece(start.first_frame, start.point_px, follower, view=start.view)

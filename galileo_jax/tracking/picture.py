@@ -19,6 +19,9 @@ SOME_FRAMES = 15  # evenly over a film, show what stands still in it
 OpenFrames = Callable[[], Iterable[np.ndarray]]
 """Gives the frames of a film from its beginning, BGR or grey."""
 
+View = Callable[[np.ndarray], np.ndarray]
+"""Makes one colour, `[height, width]` uint8, of a frame."""
+
 
 def some_frames(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
     """By their numbers `SOME_FRAMES` of the `count` frames of a film, the first among them."""

@@ -87,8 +87,13 @@ class Template:
         return self._sharp[width_px]
 
 
-def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
-    """The template of the object at `point_px` in the grey `image`."""
+def template_at(
+    image: np.ndarray, point_px: np.ndarray, outline: Outline, by_edge: bool = False
+) -> Template:
+    """The template of the object at `point_px` in the grey `image`.
+
+    `by_edge`: it is plain, though an edge of it may seem to be texture of its middle.
+    """
 
     def cut(outline: Outline, share: float) -> Template:
         region = region_of(outline, share)
@@ -97,7 +102,7 @@ def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Te
 
     if outline.size_px is not None:
         core = cut(outline, CORE_SHARE)
-        return cut(outline, RIM_SHARE) if is_plain(core) else core
+        return cut(outline, RIM_SHARE) if by_edge or is_plain(core) else core
     windows = [cut(Outline((side, side), outline.angle_rad), 1.0) for side in WINDOWS_PX]
     return next((one for one in windows if not is_plain(one)), windows[0])
 

@@ -10,7 +10,8 @@ from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.fragments import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.motion_compensation import Coding
-from galileo_jax.tracking.picture import OpenFrames, Picture
+from galileo_jax.tracking.own_colour import in_own_colours
+from galileo_jax.tracking.picture import OpenFrames, Picture, View
 from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
 from galileo_jax.tracking.second_opinion import (
@@ -59,7 +60,7 @@ def track_video(
       coding: how the frames were coded. None: each for itself.
       advance: called after every frame of both passes, of the first one with what it has found.
     """
-    clock = in_steps(times_s)
+    clock, starts = in_steps(times_s), in_own_colours(open_frames, starts)
     first = _from_frame_to_frame(open_frames, starts, clock, advance)
     count, flat = first.count, [piece for own in first.pieces for piece in own]
     shares, fits = _in_every_frame(first, open_frames, clock, advance)
@@ -116,15 +117,15 @@ def _from_frame_to_frame(
     first = _FirstPass([[] for _ in starts], Exposure())
     pieces, before = first.pieces, None
     for index, frame in enumerate(open_frames()):
-        picture = Picture(grey(frame))
+        now = _pictures(frame, {start.view for start in starts})
         used = [k for k, start in enumerate(starts) if start.uses(index)]
         for k in used:
             beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
             step = clock[index] - clock[index - 1] if index else 1.0
-            follow_on(pieces[k], starts[k], index, before, picture, first.exposure, beside, step)
-        keep_apart([pieces[k][-1] for k in used], index, before, picture)
-        before = picture
-        first.count, first.size_px = index + 1, picture.size_px
+            follow_on(pieces[k], starts[k], index, before, now, first.exposure, beside, step)
+        keep_apart([pieces[k][-1] for k in used], index, before, now)
+        before = now
+        first.count, first.size_px = index + 1, next(iter(now.values())).size_px
         advance(Seen(index, tuple(_place(own, index) for own in pieces)))
     return first
 
@@ -144,12 +145,12 @@ def _in_every_frame(
     shares = _learnt(first, looks, open_frames, clock)
     fits: list[list[Refined | None]] = [[] for _ in looks]
     for index, frame in zip(range(first.count), open_frames(), strict=False):
-        picture = Picture(grey(frame))
+        now = _pictures(frame, {look.piece.view for look in looks})
         for look, share, found in zip(looks, shares, fits, strict=True):
             fit, pose = None, look.poses[index]
             if np.isfinite(pose[0]):
                 velocities = look.piece.velocities(look.poses, index, clock)
-                fit = refine_pose(picture, look.template, pose, velocities, share)
+                fit = refine_pose(now[look.piece.view], look.template, pose, velocities, share)
             found.append(fit)
         advance(None)
     return shares, fits
@@ -183,15 +184,20 @@ def _learnt(
     as_sharp = {k: replace(looks[k].template, moved=np.zeros(3)) for k in asked}
     if asked:
         for index, frame in zip(range(first.count), open_frames(), strict=False):
-            picture = Picture(grey(frame))
+            now = _pictures(frame, {looks[k].piece.view for k in asked})
             for k in asked:
-                poses = looks[k].poses
+                poses, view = looks[k].poses, looks[k].piece.view
                 if np.isfinite(poses[index, 0]):
                     told = velocities_at(poses, index, clock)
                     velocity = (told.before + told.after) / 2
                     into = own.get(k, first.exposure)
-                    into.add(picture, as_sharp[k], poses[index], velocity)
+                    into.add(now[view], as_sharp[k], poses[index], velocity)
     return [own.get(k, first.exposure).share for k in range(len(looks))]
+
+
+def _pictures(frame: np.ndarray, views: set[View]) -> dict[View, Picture]:
+    """A frame as it is looked at."""
+    return {view: Picture(view(frame)) for view in views}
 
 
 def in_steps(times_s: np.ndarray) -> np.ndarray:

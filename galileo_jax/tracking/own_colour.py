@@ -1,0 +1,97 @@
+"""The view of an object in its own colour, in which another that touches it looks like the scene.
+
+    view = SCENE + w' (colour - scene),    w = d - (d' e) e,    |e| = 1
+
+d: how the object's colour differs from the scene's; e: the direction in which the other's does. A
+plain object is known by its edges alone, and where two touch, each has an edge of the other's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.tracking.fragments import Start
+from galileo_jax.tracking.picture import OpenFrames
+from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.template import WINDOW_PX, Outline, grey, is_plain, template_at
+
+SCENE, MOST = 64.0, 128.0  # levels of the view: the scene's, and how far the object is from it
+LEAST = 40.0  # levels by which an object must differ from both
+EVEN = 0.125  # of that, by which its middle may scatter
+HALF_PX = 4  # of the middle
+
+
+def in_own_colours(open_frames: OpenFrames, starts: Sequence[Start]) -> list[Start]:
+    """Where objects are first seen, each plain one of several with the view in its own colour."""
+    firsts = {start.first_frame for start in starts}
+    if len(starts) < 2:
+        return list(starts)
+    frames = zip(range(max(firsts) + 1), open_frames(), strict=False)
+    kept = {index: frame for index, frame in frames if index in firsts}
+    colours = [_colours(kept.get(start.first_frame), start) for start in starts]
+    known = [one for one in colours if one is not None]
+    if len(known) < len(starts):
+        return list(starts)
+    return [
+        _in_own_colour(kept[start.first_frame], start, k, known) for k, start in enumerate(starts)
+    ]
+
+
+def _colours(frame: np.ndarray | None, start: Start) -> Float[np.ndarray, "pixel 3"] | None:
+    """Of the middle of an object, less the scene's; None: nothing is known, or all is grey."""
+    if frame is None or frame.ndim < 3:
+        return None
+    x, y = (round(one) for one in start.point_px)
+    low = max(y - HALF_PX, 0), max(x - HALF_PX, 0)
+    middle = frame[low[0] : y + HALF_PX + 1, low[1] : x + HALF_PX + 1].reshape(-1, 3)
+    return middle - _scene(frame) if len(middle) else None
+
+
+def _scene(frame: np.ndarray) -> Float[np.ndarray, "3"]:
+    return np.median(frame[::4, ::4].reshape(-1, 3), axis=0)
+
+
+def _in_own_colour(
+    frame: np.ndarray, start: Start, k: int, colours: Sequence[Float[np.ndarray, "pixel 3"]]
+) -> Start:
+    """Object k with its view, and its size by that; as it is where it has texture."""
+    middle = Outline((WINDOW_PX, WINDOW_PX))
+    if not is_plain(template_at(grey(frame), np.array(start.point_px), middle)):
+        return start
+    weights = np.median(colours[k], axis=0)
+    others = [np.median(one, axis=0) for i, one in enumerate(colours) if i != k]
+    for other in others:
+        if (size := float(np.linalg.norm(other))) > LEAST:
+            weights = weights - (weights @ other) * other / size**2
+    size = float(np.linalg.norm(weights))
+    if size < LEAST or (colours[k] @ weights / size).std() > EVEN * size:
+        return start
+    share = min(1.0, MOST / size)
+    mixed = share * weights / size
+    row = np.array([[*mixed, SCENE - mixed @ _scene(frame)]])
+
+    def view(frame: np.ndarray) -> np.ndarray:
+        return cv2.transform(frame, row)
+
+    outline = start.outline
+    if outline.size_px is None:
+        off = np.linalg.norm(frame - _scene(frame) - np.median(colours[k], axis=0), axis=2)
+        outline = _seen(off < size / 2, start.point_px, outline)
+    return replace(start, view=view, outline=outline)
+
+
+def _seen(mask: np.ndarray, point_px: tuple[float, float], outline: Outline) -> Outline:
+    """An outline with the size of the part at a point, as far as it goes on both sides of that."""
+    parts = cv2.connectedComponents(mask.astype(np.uint8))[1]
+    x, y = (round(one) for one in point_px)
+    rows, columns = np.nonzero(parts == parts[y, x])
+    own = (np.column_stack([columns, rows]) - point_px) @ rotation(outline.angle_rad)
+    width, height = 2 * np.minimum(-own.min(axis=0), own.max(axis=0)) + 1
+    if not mask[y, x] or min(width, height) < 2 * HALF_PX:
+        return outline
+    if outline.is_round:
+        width = height = min(width, height)
+    return replace(outline, size_px=(float(width), float(height)))
