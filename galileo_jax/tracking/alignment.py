@@ -34,7 +34,7 @@ NUM_RIGID = 5  # rows of the Jacobian without those of a stretched patch
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
 """How much a patch may be stretched (sd), against noise, grey levels, of a pixel whose neighbours
 have the same."""
-COVERED, FAINT = 4.0, 0.1
+COVERED, FAINT = 4.0, 0.25
 """Noise sigmas, and contrasts of the object: a pixel that differs by more than both shows something
 else than the object."""
 NEIGHBOURS = (0.1, 0.9)  # bounds of what neighbouring pixels' noise is believed to correlate by

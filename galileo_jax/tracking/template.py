@@ -135,7 +135,9 @@ def median_template(patches: list[np.ndarray], region: np.ndarray) -> Template:
     stack = np.stack(patches)
     inside = stack[:, region]
     middle = np.median(inside, axis=1)
-    spread = np.median(np.abs(inside - middle[:, None]), axis=1) + 1e-3
+    # More than half of a plain object's region looks the same.
+    low, high = np.quantile(inside, (0.25, 0.75), axis=1)
+    spread = (high - low) / 2 + 1e-3
     scaled = (stack - middle[:, None, None]) / spread[:, None, None]
     scaled = scaled * np.median(spread) + np.median(middle)
     return Template(np.median(scaled, axis=0).astype(np.float32), region)

@@ -54,9 +54,10 @@ def _covered(place: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("is_known", [True, False])
 @pytest.mark.parametrize("off_px", [0.0, 4.0])
-def test_plain_boxes_that_touch_are_told_apart(is_known: bool, off_px: float) -> None:
+@pytest.mark.parametrize("noise", [0.1, 2.0])
+def test_plain_boxes_that_touch_are_told_apart(noise: float, is_known: bool, off_px: float) -> None:
     """Their sizes may be unknown, and the marks beside their middles."""
-    pictures, true = filmed(RED, GREEN), paths()
+    pictures, true = filmed(RED, GREEN, noise=noise), paths()
     outline = Outline(tuple(SIDES) if is_known else None)
     starts = [
         Start(name, tuple(path[0] + off_px), outline)
@@ -66,7 +67,7 @@ def test_plain_boxes_that_touch_are_told_apart(is_known: bool, off_px: float) ->
     for place, path in zip(track.position_px, true, strict=True):
         error = np.linalg.norm(place - path - off_px, axis=1)
         assert np.isfinite(error).mean() > 0.9
-        assert np.nanmedian(error) < 0.15 and np.nanmax(error) < 0.6
+        assert np.nanmedian(error) < 0.2 and np.nanmax(error) < 0.6
 
 
 def test_what_has_texture_or_no_colour_is_looked_at_in_grey() -> None:
