@@ -67,7 +67,7 @@ def test_plain_boxes_that_touch_are_told_apart(noise: float, is_known: bool, off
     for place, path in zip(track.position_px, true, strict=True):
         error = np.linalg.norm(place - path - off_px, axis=1)
         assert np.isfinite(error).mean() > 0.9
-        assert np.nanmedian(error) < 0.2 and np.nanmax(error) < 0.6
+        assert np.nanmedian(error) < 0.2 and np.nanmax(error) < 0.8
 
 
 def test_what_has_texture_or_no_colour_is_looked_at_in_grey() -> None:
