@@ -9,6 +9,7 @@ import numpy as np
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.numerics.least_squares import line_through, polynomial, two_lines
+from galileo_jax.table.clock import usual_step
 from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
 STRAIGHT = 0.03  # of a path's length: what stays within this of a line is straight
@@ -27,7 +28,6 @@ share of them has the same sign where something bounces: half do where it swings
 
 FALL_M_S2 = (7.0, 12.0)  # what a fall accelerates with, air and a camera that is not level in it
 GAP = 1.5  # of the usual step
-EVEN = 0.3  # of it: by more rounding to milliseconds moves none of 240 a second
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,7 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
     if (count := len(table.starts)) > 1:
         warnings += (f"{path}: {count} motions, of which the first is looked at",)
         table = table.motion(1)
-    steps = np.diff(table.clock)
-    usual = float(np.quantile(steps, 0.5, method="lower")) if steps.size else math.nan
-    # Of times that were rounded, 0.017, 0.033, 0.050, the middle one is no step.
-    step = float(np.mean(steps[np.abs(steps - usual) <= EVEN * usual])) if steps.size else math.nan
+    steps, step = np.diff(table.clock), usual_step(table.clock)
     place = table.position[0]
     shown = np.isfinite(place).all(axis=0)
     likely = _likely(table, table.seconds(fps)[shown], place[:, shown])

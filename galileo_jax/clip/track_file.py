@@ -36,6 +36,7 @@ from galileo_jax.clip.track_noise import roughness_covariance_m2
 from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError, named
+from galileo_jax.table.clock import usual_step
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.pandas_h5 import is_hdf5
 from galileo_jax.table.spreadsheet import is_spreadsheet
@@ -108,7 +109,7 @@ def _own(of: DeclaredTrack) -> FileTrack:
         raise of.wrong(
             f"column '{column}': means nothing in scenario {of.file.scenario}; leave it out"
         )
-    return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
+    return FileTrack(observation, "m", 1 / usual_step(observation.times_s), is_own=True)
 
 
 def _turned_up(observation: Observation) -> Observation:
@@ -167,7 +168,7 @@ def _foreign(of: DeclaredTrack) -> FileTrack:
     return FileTrack(
         observation,
         unit,
-        fps=1 / table.frame_s_by(of.fps) if table.is_in_frames else _frame_rate(times),
+        fps=1 / table.frame_s_by(of.fps) if table.is_in_frames else 1 / usual_step(times),
         pixels_per_metre=scale,
         origin_px=origin,
         direction=direction,
@@ -307,7 +308,7 @@ def _rescaled(
     """The times of a table that has some, at the declared rate, and what is said of that."""
     if table.is_in_frames or of.fps is None:
         return times, ()
-    clock, rate = at_declared_rate(Clock(times, _frame_rate(times), False), of.fps)
+    clock, rate = at_declared_rate(Clock(times, 1 / usual_step(times), False), of.fps)
     if abs(of.fps / rate - 1) < AS_DECLARED:
         return times, ()
     return clock.times_s, (
@@ -330,10 +331,6 @@ def _doubts(of: DeclaredTrack, table: TrackTable) -> tuple[str, ...]:
 def _last_place_m(table: TrackTable, metres: float) -> list[float]:
     """The unit in the last place of each axis, m; 0 where it is not known."""
     return [0.0 if math.isnan(one) else one * metres for one in table.resolution] or [0.0, 0.0]
-
-
-def _frame_rate(times_s: np.ndarray) -> float:
-    return float(1 / np.median(np.diff(times_s)))
 
 
 def _observation(

@@ -5,6 +5,7 @@ Of dates in any order of day and month the day has to be the same in all rows, a
 Dates and clocks are counted from the first row on before anything is rounded.
 """
 
+import math
 import re
 from datetime import UTC, datetime
 
@@ -21,6 +22,7 @@ DAY = re.compile(r"(?:(\d{1,4}([./-])\d{1,2}\2\d{1,4}),?[T ]\s*)?([\d:.,]+)\s*([
 
 DAY_S = 86400.0
 SAME_RATE = 0.1  # of a rate, by which hundredths from row to row may tell another
+LIKE_STEPS = 0.3  # of a step: by more rounding to milliseconds moves none of 240 a second
 COMMON_FPS = (24, 25, 30, 48, 50, 60, 100, 120, 240)
 
 
@@ -108,6 +110,19 @@ def _from_first(values: np.ndarray, resolution: float) -> Numbers:
     seen, found = np.isfinite(values), np.full_like(values, np.nan)
     found[seen] = np.unwrap(values[seen], period=DAY_S)
     return Numbers(found - (found[seen][0] if seen.any() else 0.0), resolution)
+
+
+def usual_step(times: np.ndarray) -> float:
+    """From one of the times `[row]` to the next, where none is missing; NaN of a single one.
+
+    Of times that were rounded, 0.017, 0.033, 0.050, the middle step is none: the mean of those that
+    differ from it by less than `LIKE_STEPS`.
+    """
+    steps = np.diff(times)
+    if not steps.size:
+        return math.nan
+    middle = float(np.quantile(steps, 0.5, method="lower"))
+    return float(np.mean(steps[np.abs(steps - middle) <= LIKE_STEPS * middle]))
 
 
 def _parts_of_second(whole: np.ndarray, last: np.ndarray, fps: float | None) -> float | None:
