@@ -120,6 +120,8 @@ def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely
 
 def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
     """The likeliest scenario of one coordinate in time."""
+    if _bounces(way):
+        return Likely("fall", "one coordinate, which is thrown back", bounces=True)
     if (turns := len(_turning(way))) >= SWINGS:
         why = f"one coordinate, which turns back {turns} times"
         return Likely("spring", why, swings=len(_turning(way, HALF)))

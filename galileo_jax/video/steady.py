@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float
 
 WIDEST_PX = 640  # pictures are made so small: their many slopes tell hundredths of a pixel
 LEVELS = 4  # each half as large as the one before
-CELLS, OF_CELL = 20, 60  # along the width of a picture; pixels of each at most
+CELLS, OF_CELL = 20, 60  # along the longer side of a picture; pixels of each at most
 BLUR_PX = 1.0
 NOISE_GREY, SHIFT_PX = 2.0, 0.2  # by which a pixel is off: in brightness, and in place
 LEAST_SLOPE = 2.0  # grey levels per pixel: below, noise and coding hide it
@@ -178,7 +178,7 @@ def _still(picture: np.ndarray) -> _Still:
     )
     steep = np.hypot(dx, dy)
     height, width = picture.shape
-    side, chosen = max(width // CELLS, 2), []
+    side, chosen = max(max(width, height) // CELLS, 2), []
     index = np.arange(height * width).reshape(height, width)
     for top in range(1, height - 1, side):
         for left in range(1, width - 1, side):

@@ -101,6 +101,15 @@ def test_a_camera_that_opens_up_is_followed():
     assert off_px(found, camera) < steady.TOLD_PX
 
 
+@pytest.mark.parametrize("shape", [(640, 360), (360, 640), (500, 500)])
+def test_a_picture_of_noise_is_looked_at_whichever_way_it_is_held(shape: tuple[int, int]):
+    """Each pixel is steep there, and OpenCV reads 2^15 places at once at most."""
+    rng = np.random.default_rng(0)
+    pictures = list(rng.integers(0, 255, (2, *shape)).astype(np.uint8))
+    assert len(list(steady.to_first([pictures[0], pictures[0]]))) == 2
+    assert list(steady.to_first(pictures))[1] is None
+
+
 def glimpsed(pictures: list[np.ndarray]) -> bool:
     glimpses = steady.Glimpses()
     for picture in pictures:
