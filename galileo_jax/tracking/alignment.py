@@ -34,9 +34,10 @@ NUM_RIGID = 5  # rows of the Jacobian without those of a stretched patch
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
 """How much a patch may be stretched (sd), against noise, grey levels, of a pixel whose neighbours
 have the same."""
-COVERED, FAINT = 4.0, 0.25
-"""Noise sigmas, and contrasts of the object: a pixel that differs by more than both shows something
-else than the object."""
+COVERED = 4.0  # noise sigmas: a pixel that differs by more shows something else than the object
+FLAT = 0.06
+"""Least noise of a plain object, by its contrast: most of its pixels look the same, and tell
+nothing of what its edge scatters by, where sampling and what is behind it add to noise."""
 NEIGHBOURS = (0.1, 0.9)  # bounds of what neighbouring pixels' noise is believed to correlate by
 SETTLED_PX, SETTLED_RAD = 0.01, 3e-4
 """0.005 px at the rim of a 30 px object; smaller steps change nothing."""
@@ -64,10 +65,12 @@ class Target:
         region: np.ndarray,
         width_px: float,
         shows_turns: bool | None = None,
+        is_plain: bool = False,
     ):
         """`image` and `region` (bool) are `[size, size]`; `width_px` the smoothing.
 
         `shows_turns`: of the object, where that is known; a smear hides turns only in part.
+        `is_plain`: whether it is known by its edge alone.
         """
         self.width_px = width_px
         self.radius = (image.shape[0] - 1) // 2
@@ -81,6 +84,7 @@ class Target:
         dy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8).take(inside)
         turned = dy * self.places[0] - dx * self.places[1]
         self.values = smooth.take(inside).astype(np.float64)
+        self.least_noise = FLAT * float(self.values.std()) if is_plain else 1e-6
         stretched = [dx * self.places[0], dy * self.places[1]]
         stretched += [dx * self.places[1] + dy * self.places[0]]
         # Rows: the pose in the object's axes, gain, offset, how it is stretched.
@@ -136,7 +140,7 @@ def align(
         residual = seen - solution @ jacobian
         size = np.abs(residual)
         # The median of an even number but for one place, in a fraction of np.median's time.
-        noise = 1.4826 * _middle(size) + 1e-6
+        noise = 1.4826 * _middle(size) + target.least_noise
         if robust:
             weight = (HUBER * noise / np.maximum(size, 1e-9)).clip(max=1.0)
             weight *= size < REJECT * noise
@@ -163,9 +167,7 @@ def align(
         pose=pose,
         correlation=float(wb @ a / scale),
         noise=float(noise),
-        covered=float(
-            np.mean(size > max(COVERED * noise, FAINT * abs(gain) * float(np.std(values))))
-        ),
+        covered=float(np.mean(size > COVERED * noise)),
         gain=float(solution[3]),
         weight=weight,
         residual=residual,

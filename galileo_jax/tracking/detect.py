@@ -72,6 +72,7 @@ def find_movers(
     axes_angle_rad: float = 0.0,
     may_fly: bool = True,
     outlined: bool = True,
+    wanted: int = 1,
     advance: Callable[[], None] = lambda: None,
 ) -> list[Mover]:
     """The things that move: what flies, what stays in the picture, the others; each by onset.
@@ -82,12 +83,14 @@ def find_movers(
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
       may_fly: whether something may, which is looked for then.
       outlined: whether outlines of what has features are looked for.
+      wanted: how many things are asked for; where fewer have features, or fly, silhouettes that go
+        farthest are the others.
       advance: called after every frame.
 
     Raises:
       CameraMovesError: the whole picture moves, so that nothing says what is in motion.
 
-    Limits: beside a thing with texture, those without, or that come later, are found if they fly.
+    Limits: beside as many things with texture as are wanted, others are found if they fly.
     """
     path, size_px = _feature_paths(open_frames, advance)
     moved = np.linalg.norm(path - path[:1], axis=2) > MOVED_PX
@@ -98,15 +101,12 @@ def find_movers(
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     groups = _groups(path, onset, span_px)
-    looks_on = may_fly or not groups
+    looks_on = may_fly or len(groups) < wanted
     some = some_frames(open_frames, len(path)) if looks_on or outlined else {}
     ways = paths_of(open_frames, np.arange(len(path)), some) if looks_on else []
     ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
-    flying = [
-        one
-        for one in ways
-        if _flies(one) and not any(_is_same(one, path[:, members]) for members in groups)
-    ]
+    ways = [one for one in ways if not any(_is_same(one, path[:, members]) for members in groups)]
+    flying = [one for one in ways if _flies(one)]
     movers, margin = [], BORDER_SHARE * size_px[0]
     labels = differences(some) if outlined else {}
     for members, places in _with_outlines(path, onset, groups, labels):
@@ -123,12 +123,10 @@ def find_movers(
                 goes_right=bool(np.median(last[:, 0] - began[:, 0]) >= 0),
             )
         )
-    if not movers and not flying:
-        farthest = max(ways, key=lambda one: one.way_px, default=None)
-        if farthest is None or farthest.way_px < farthest.parts[0].size_px:
-            return []
-        return [_silhouette(farthest, len(path))]
-    movers += [_silhouette(one, len(path)) for one in flying]
+    others = [one for one in ways if not _flies(one) and one.way_px >= one.parts[0].size_px]
+    others = sorted(others, key=lambda one: -one.way_px)
+    lacking = max(wanted - len(movers) - len(flying), 0)
+    movers += [_silhouette(one, len(path)) for one in (*flying, *others[:lacking])]
     return sorted(movers, key=lambda one: (not one.flies, one.leaves_picture, one.onset_frame))
 
 

@@ -314,7 +314,7 @@ class Follower:
         if not self.template.is_sharp:
             # The first sharp look of what was smeared takes the smeared one's place.
             self.patches, self.frames_sharp, self.stride = [], 0, 1
-            self.template = Template(patch, self.template.region)
+            self.template = self.template.renewed(patch)
         if self.frames_sharp % self.stride == 0:
             self.patches.append(patch)
             if len(self.patches) > MAX_PATCHES:
@@ -322,4 +322,4 @@ class Follower:
                 self.stride *= 2
         self.frames_sharp += 1
         if self.frames_sharp in RENEWALS:
-            self.template = median_template(self.patches, self.template.region)
+            self.template = median_template(self.patches, self.template)

@@ -16,12 +16,13 @@ from jaxtyping import Float
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.picture import OpenFrames
 from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.template import WINDOW_PX, Outline, grey, is_plain, template_at
+from galileo_jax.tracking.template import RIM_SHARE, WINDOW_PX, Outline, grey, is_plain, template_at
 
 SCENE, MOST = 64.0, 128.0  # levels of the view: the scene's, and how far the object is from it
 LEAST = 40.0  # levels by which an object must differ from both
 EVEN = 0.125  # of that, by which its middle may scatter
 HALF_PX = 4  # of the middle
+ALL_ROUND = 1.1  # times as far as the edge that is farthest from the mark
 
 
 def in_own_colours(open_frames: OpenFrames, starts: Sequence[Start]) -> list[Start]:
@@ -58,7 +59,8 @@ def _in_own_colour(
     frame: np.ndarray, start: Start, k: int, colours: Sequence[Float[np.ndarray, "pixel 3"]]
 ) -> Start:
     """Object k with its view, and its size by that; as it is where it has texture."""
-    middle = Outline((WINDOW_PX, WINDOW_PX))
+    width, height = start.outline.size_px or (WINDOW_PX, WINDOW_PX)
+    middle = replace(start.outline, size_px=(width / 2, height / 2))
     if not is_plain(template_at(grey(frame), np.array(start.point_px), middle)):
         return start
     weights = np.median(colours[k], axis=0)
@@ -84,14 +86,15 @@ def _in_own_colour(
 
 
 def _seen(mask: np.ndarray, point_px: tuple[float, float], outline: Outline) -> Outline:
-    """An outline with the size of the part at a point, as far as it goes on both sides of that."""
+    """An outline with the size of the part at a point, so large that all its edge is compared."""
     parts = cv2.connectedComponents(mask.astype(np.uint8))[1]
     x, y = (round(one) for one in point_px)
     rows, columns = np.nonzero(parts == parts[y, x])
     own = (np.column_stack([columns, rows]) - point_px) @ rotation(outline.angle_rad)
-    width, height = 2 * np.minimum(-own.min(axis=0), own.max(axis=0)) + 1
+    low, high = own.min(axis=0), own.max(axis=0)
+    width, height = np.maximum(high - low + 1, ALL_ROUND * 2 * np.maximum(-low, high) / RIM_SHARE)
     if not mask[y, x] or min(width, height) < 2 * HALF_PX:
         return outline
     if outline.is_round:
-        width = height = min(width, height)
+        width = height = max(width, height)
     return replace(outline, size_px=(float(width), float(height)))

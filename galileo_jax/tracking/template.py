@@ -1,6 +1,6 @@
 """An object's template: its patch, the region that belongs to it, and its smeared versions."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import cv2
@@ -44,12 +44,17 @@ class Template:
     image: np.ndarray
     region: np.ndarray
     moved: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    is_plain: bool = False  # known by its edge alone
     _sharp: dict[float, Target] = field(default_factory=dict, repr=False)
 
     @property
     def radius(self) -> int:
         """Pixels from the centre, the followed point, to the patch's border."""
         return (self.image.shape[0] - 1) // 2
+
+    def renewed(self, image: np.ndarray) -> "Template":
+        """A sharp one of the same region."""
+        return Template(image, self.region, is_plain=self.is_plain)
 
     @cached_property
     def shows_turns(self) -> bool:
@@ -78,12 +83,14 @@ class Template:
         least, region = MIN_REGION_SHARE * self.region.mean(), share >= ALWAYS
         if region.mean() < least:
             region = share >= np.quantile(share, 1 - least)
-        return Target(smeared, region, width_px, self.shows_turns)
+        return Target(smeared, region, width_px, self.shows_turns, self.is_plain)
 
     def sharp(self, width_px: float) -> Target:
         """What a patch looks like that does not move."""
         if width_px not in self._sharp:
-            self._sharp[width_px] = Target(self.image, self.region, width_px)
+            self._sharp[width_px] = Target(
+                self.image, self.region, width_px, is_plain=self.is_plain
+            )
         return self._sharp[width_px]
 
 
@@ -102,7 +109,8 @@ def template_at(
 
     if outline.size_px is not None:
         core = cut(outline, CORE_SHARE)
-        return cut(outline, RIM_SHARE) if by_edge or is_plain(core) else core
+        is_by_edge = by_edge or is_plain(core)
+        return replace(cut(outline, RIM_SHARE), is_plain=True) if is_by_edge else core
     windows = [cut(Outline((side, side), outline.angle_rad), 1.0) for side in WINDOWS_PX]
     return next((one for one in windows if not is_plain(one)), windows[0])
 
@@ -126,21 +134,21 @@ def region_of(outline: Outline, share: float) -> np.ndarray:
     return (np.hypot(*own.T).T if outline.is_round else np.abs(own).max(axis=-1)) <= 1
 
 
-def median_template(patches: list[np.ndarray], region: np.ndarray) -> Template:
+def median_template(patches: list[np.ndarray], like: Template) -> Template:
     """The pixelwise median of aligned patches: less noise, and no hand that was there a while.
 
-    Each patch is first brought to the common brightness (gain and offset by its median and
-    spread in the region).
+    `like`: the template that they look like. Each patch is first brought to the common brightness
+    (gain and offset by its median and spread in the region).
     """
     stack = np.stack(patches)
-    inside = stack[:, region]
+    inside = stack[:, like.region]
     middle = np.median(inside, axis=1)
     # More than half of a plain object's region looks the same.
     low, high = np.quantile(inside, (0.25, 0.75), axis=1)
     spread = (high - low) / 2 + 1e-3
     scaled = (stack - middle[:, None, None]) / spread[:, None, None]
     scaled = scaled * np.median(spread) + np.median(middle)
-    return Template(np.median(scaled, axis=0).astype(np.float32), region)
+    return like.renewed(np.median(scaled, axis=0).astype(np.float32))
 
 
 def grey(frame: np.ndarray) -> np.ndarray:

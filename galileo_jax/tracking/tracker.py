@@ -167,7 +167,7 @@ class _Look(NamedTuple):
 def _final_template(follower: Follower) -> Template:
     """The median of an object's sharp patches; smeared as its first frame if there are none."""
     own = follower.template
-    return replace(median_template(follower.patches, own.region), moved=own.moved)
+    return replace(median_template(follower.patches, own), moved=own.moved)
 
 
 def _learnt(
