@@ -79,7 +79,8 @@ def verdict(diagnosis: Diagnosis) -> str:
             f"({without} without, {p_equals(last.comparison.p_value)} with)."
         )
     if found.status == "ambiguous":
-        return ambiguity(found.effects if found.law is None else (*found.effects, found.law.text))
+        formula = () if found.law is None else (f"the formula ({found.law.text})",)
+        return ambiguity((*found.effects, *formula))
     chosen = {candidate.effects: candidate.p_value for candidate in diagnosis.candidates}
     p = chosen.get(found.effects)
     if found.status == "named":

@@ -13,7 +13,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import clock_times
 from galileo_jax.table.heading import Heading
 from galileo_jax.table.numbers import Numbers, is_nothing, is_number, parse_columns
-from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, Title, is_no_place
+from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, Title, is_no_place, is_rate
 from galileo_jax.table.track_table import MIN_LIKELIHOOD
 
 PLACES = ("x", "y", "z", "line", "angle")
@@ -87,7 +87,8 @@ def _parsed(heading: Heading, which: list[int]) -> dict[int, Numbers]:
 
 def _may_be_used(heading: Heading, n: int) -> bool:
     """Whether a column without a known title can be time or place: numbers, in no other unit."""
-    if heading.meanings[n].unit is None and is_no_place(heading.titles[n]):
+    title, unit = heading.titles[n], heading.meanings[n].unit
+    if is_rate(title) or (unit is None and is_no_place(title)):
         return False
     cells = [row[n] for _, row in heading.body[:200] if n < len(row) and row[n]]
     return bool(cells) and all(is_number(cell) or is_nothing(cell) for cell in cells)
@@ -164,10 +165,10 @@ def _with_places(columns: Columns) -> Columns:
     roles = {1: ("line",), 2: ("x", "y"), 3: ("x", "y", "z")}.get(len(free))
     if roles is None:
         titles = [title for title in columns.heading.titles if title]
-        shown = ", ".join(repr(title[:40]) for title in titles[:8]) or "no titles"
+        shown = ", ".join(repr(title[:40]) for title in titles[:8])
         raise InputError(
-            f"which columns are places is not told by {shown}; titles such as t (s), "
-            "x (m), y (m) expected"
+            f"which columns are places is not told{f' by {shown}' if shown else ''}; titles such "
+            "as t (s), x (m), y (m) expected"
         )
     given = dict(zip(free, roles, strict=True))
     taken = (f"{columns.name_of(n)} as {'the way' if r == 'line' else r}" for n, r in given.items())

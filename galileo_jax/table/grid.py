@@ -42,7 +42,10 @@ def cells_of(content: bytes) -> Rows:
         return _checked(spreadsheet_rows(content))
     if (listed := named_lists(content)) is not None:
         return _checked(listed)
-    rows = _split(_lines(decoded(content)))
+    text = decoded(content)
+    if text.lstrip()[:1] == "<":
+        raise InputError("a web page, or XML; save its table as csv or as a spreadsheet")
+    rows = _split(_lines(text))
     is_alone = all(not any(row[1:]) for _, row in rows)
     if is_alone and any(mark in row[0] for _, row in rows for mark in "\t;,"):
         # A spreadsheet that took each line for one cell puts quotes round it, or empty cells after.

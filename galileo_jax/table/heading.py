@@ -15,7 +15,15 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.grid import COMMENT
 from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_number
-from galileo_jax.table.titles import LENGTHS, Title, is_turning, parted_unit, title_of, unit_of
+from galileo_jax.table.titles import (
+    LENGTHS,
+    Title,
+    is_of_all_rows,
+    is_turning,
+    parted_unit,
+    title_of,
+    unit_of,
+)
 
 MULTI = "multi:"
 DIGITS = re.compile(r"\s*\d+")  # by which runs are told apart: "s1 (cm)", "s 2 (cm)"
@@ -24,7 +32,8 @@ RATES = (
     *("frequency", "fps", "frame rate", "framerate", "sampling rate"),
     *("export frame rate", "capture frame rate", "datarate", "camerarate"),
 )
-UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit")
+UNIT_OF_LENGTH = ("units", "unit", "length units", "length unit", "y_unit_label")
+END_OF_HEADER = "***"  # LabVIEW's line between its header and the table
 NEAR_TITLES = 3  # rows: so near above the titles stand numbers of bodies
 MARKERS = "marker_names"  # motion capture: three columns for each of the names that follow
 
@@ -52,7 +61,7 @@ def split_heading(rows: Rows) -> Heading:
     Raises:
       InputError: there are no numbers, or a row has more cells than titles.
     """
-    rows = _units_in_a_row(rows)
+    rows = _units_in_a_row(_upright(rows))
     width = max(len(row) for _, row in rows)
     later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
     words = _word_columns(later, width)
@@ -69,8 +78,8 @@ def split_heading(rows: Rows) -> Heading:
     commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
     above = [(line, _uncommented(row)) for line, row in rows[:start]]
     body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
-    while not _has_number(body[-1][1]):  # words below the table
-        body.pop()
+    while not _has_number(body[-1][1]) or is_of_all_rows(body[-1][1][0]):
+        body.pop()  # words below the table: a remark, or the mean of a column
     counts = [_num_titles(row) for _, row in above]
     if max(counts, default=0) < 2:
         above = _listed_titles(above, max(len(row) for _, row in body)) or above
@@ -94,9 +103,10 @@ def split_heading(rows: Rows) -> Heading:
     body = [(line, row) for line, row in body if at < 0 or row != above[at][1]]
     titles = _with_clock_above(titles, [row for _, row in above[: max(at, 0)]])
     units = next((row for _, row in above if _is_units(row)), [])
+    ends = [n for n, (_, row) in enumerate(above) if row[0].startswith(END_OF_HEADER)]
     over = [
         row
-        for line, row in above[: max(at, 0)]
+        for line, row in above[max(ends, default=-1) + 1 : max(at, 0)]
         if not (_is_units(row) or _has_number(row) or line in commented)
         and not _is_titles_again(row, titles)
     ]
@@ -118,6 +128,20 @@ def split_heading(rows: Rows) -> Heading:
         meanings.append(meaning)
     is_titled = any(one.role for one in meanings)
     return Heading(tuple(titles[:width]), tuple(meanings), body, is_titled, _frame_s(above))
+
+
+def _upright(rows: Rows) -> Rows:
+    """The rows, or of a table that lies on its side the columns: each of its rows has a title."""
+    if len(rows) >= len(rows[0][1]) or len({len(row) for _, row in rows}) > 1:
+        return rows
+    roles = {title_of(row[0]).role for _, row in rows}
+    if not roles & {"time", "frame"} or not all(
+        _is_value(c) or is_nothing(c) for _, row in rows for c in row[1:]
+    ):
+        return rows
+    return [
+        (n, list(cells)) for n, cells in enumerate(zip(*(row for _, row in rows), strict=True), 1)
+    ]
 
 
 def _units_in_a_row(rows: Rows) -> Rows:

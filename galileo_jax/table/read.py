@@ -4,7 +4,6 @@ bytes -> text -> grid of cells -> titles, units, names -> roles of columns -> nu
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -17,6 +16,7 @@ from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.columns import PLACES, Columns, with_roles
 from galileo_jax.table.grid import cells_of
 from galileo_jax.table.heading import one_below_the_other, split_heading
+from galileo_jax.table.numbers import Numbers
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
     each_place_once,
@@ -29,8 +29,8 @@ from galileo_jax.table.repeated import (
 )
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
-from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, way_up
-from galileo_jax.table.track_table import MIN_LIKELIHOOD, Column, TrackTable
+from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, is_axis, way_up
+from galileo_jax.table.track_table import METRES_PER_UNIT, MIN_LIKELIHOOD, Column, TrackTable
 from galileo_jax.table.tracker_trk import is_trk, read_trk
 
 ONLY = "object1"  # the name of an object whose columns have none
@@ -213,7 +213,8 @@ def _places(
         lacking += [(role, first_name) for role in of if role not in axes]
         for role, who in lacking:
             raise InputError(f"no column {role} of {who[:40]!r}; all objects have the same ones")
-    numbers = [[columns.numbers[of[role]] for role in axes] for of in by_name.values()]
+    unit = _unit(columns)
+    numbers = [[_in_unit(columns, of[role], unit) for role in axes] for of in by_name.values()]
     places = np.array([[one.values for one in row] for row in numbers])
     for index, name in enumerate(by_name):
         sure = (n for n in columns.of("likelihood") if columns.meanings[n].name == name)
@@ -238,7 +239,8 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
     for role in PLACES:
         for n in columns.of(role):
             of = by_name.setdefault(columns.meanings[n].name, {})
-            exact = [at for at in (of.get(role), n) if at is not None and _is_exact(columns, at)]
+            both = (at for at in (of.get(role), n) if at is not None)
+            exact = [at for at in both if is_axis(columns.heading.titles[at])]
             if role in of and len(exact) == 1:  # beside y a height is another thing's, or a box's
                 of[role] = exact[0]
                 continue
@@ -262,24 +264,27 @@ def _columns_by_name(columns: Columns) -> dict[str, dict[str, int]]:
     return by_name
 
 
-def _is_exact(columns: Columns, n: int) -> bool:
-    """Whether a column's title is its axis alone, with its unit or without."""
-    words = re.split(r"[\s(\[/,]", columns.heading.titles[n].lower())
-    return words[0] == columns.meanings[n].role
-
-
 def _unit(columns: Columns) -> str | None:
-    """The unit of length; None where no title has one."""
+    """The unit of length, of several the first that a title has; None where none has one."""
     places = [n for role in ("x", "y", "z", "line") for n in columns.of(role)]
-    written = {columns.meanings[n].unit for n in places}
-    known = {LENGTHS.get(unit, unit) if unit else None for unit in written}
-    if len(known) > 1:
-        units = ", ".join(sorted(unit or "none" for unit in known))
+    written = [columns.meanings[n].unit for n in places]
+    known = [LENGTHS.get(unit, unit) if unit else None for unit in written]
+    if len(set(known)) > 1 and not METRES_PER_UNIT.keys() >= set(known):
+        units = ", ".join(sorted({unit or "none" for unit in known}))
         raise InputError(f"the columns x and y are in different units: {units}")
-    unit = known.pop() if known else None
+    unit = known[0] if known else None
     if unit is not None and unit not in LENGTHS.values():
         raise InputError(f"places in {unit}; {', '.join(sorted(set(LENGTHS.values())))} expected")
     return unit
+
+
+def _in_unit(columns: Columns, n: int, unit: str | None) -> Numbers:
+    """A column of places in the unit of all."""
+    found, own = columns.numbers[n], LENGTHS.get(columns.meanings[n].unit or "")
+    if own == unit or own not in METRES_PER_UNIT or unit not in METRES_PER_UNIT:
+        return found
+    factor = METRES_PER_UNIT[own] / METRES_PER_UNIT[unit]
+    return Numbers(factor * found.values, factor * found.resolution)
 
 
 def _by_object(

@@ -28,8 +28,8 @@ POINTS: dict[str, Literal["up", "down"]] = {
 WORDS: dict[str, Role] = {
     word: meaning.split()[0] for word, meaning in _by_word(_LISTS["roles"]).items()
 }
-FILLERS, TURNINGS, OTHER_UNITS = (
-    frozenset(_LISTS[key].split()) for key in ("fillers", "turnings", "other_units")
+FILLERS, TURNINGS, OF_ALL_ROWS, OTHER_UNITS = (
+    frozenset(_LISTS[key].split()) for key in ("fillers", "turnings", "of all rows", "other_units")
 )
 DERIVED = TURNINGS | frozenset(_LISTS["derived"].split())
 SYMBOLS = frozenset("va")
@@ -41,6 +41,7 @@ RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
 UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
+RATE = re.compile(r"(?:^|[\s(\[/])(?:px|mm|cm|m|km|ft|in|rad|deg|°)\s*/\s*(?:ms|s|h|min)(?![a-z])")
 WITH_UNIT = re.compile(r"([-+\u2212]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?)\s*([^\d\s.,+-]\S*)")
 NUMBERED = re.compile(r"(\D+)(\d+)|([xyz])([a-z])", re.IGNORECASE)  # 'abscisse1', 'xA'
 
@@ -78,6 +79,21 @@ def is_no_place(text: str) -> bool:
     words = re.split(r"[\s_\-./]+", BRACKETS.sub(" ", text).lower())
     is_derived = any(word.rstrip("0123456789") in DERIVED for word in words)
     return is_derived or any(unit in OTHER_UNITS for unit in BRACKETS.findall(text))
+
+
+def is_of_all_rows(text: str) -> bool:
+    """Whether a text says that what stands beside it is a mean or a sum: 'Mittelwert:'."""
+    return text.lower().partition(" ")[0].strip(":.") in OF_ALL_ROWS
+
+
+def is_rate(text: str) -> bool:
+    """Whether a title's unit is that of a speed or an acceleration: 'v (m/s)', 'a in m/s²'."""
+    return RATE.search(text.lower()) is not None
+
+
+def is_axis(text: str) -> bool:
+    """Whether a title is its axis alone, with its unit or without."""
+    return re.split(r"[\s(\[/,]", text.lower())[0] == title_of(text).role
 
 
 def way_up(text: str) -> Literal["up", "down"] | None:

@@ -230,8 +230,8 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         container = av.open(str(path))
     except av.error.FFmpegError as error:
         raise InputError(
-            f"{path}: cannot be decoded: not a video (a table's name ends in .csv, .txt or .xlsx), "
-            "or cut off before its index; copy it from the camera again"
+            f"{path}: cannot be decoded: neither a video nor a table (csv, txt, xlsx, json, mat, "
+            "trk), or a video cut off before its index; copy it from the camera again"
         ) from error
     with container:
         stream: Any = container.streams.best("video")

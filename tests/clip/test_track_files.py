@@ -266,8 +266,8 @@ BROKEN = {
                            "track_units: cm", "line 3: t: 'x' is not a number"),
     "table_without_unit": ("a.csv", TABLE, "track_y: up", "a.yaml: track_units: missing"),
     "table_in_wrong_unit": ("a.csv", TABLE, "track_units: m; track_y: down", "moves at 912 m/s"),
-    "table_of_two_units": ("a.csv", broken(make.plain_table(True), "x (mm)", "x (m)"), "",
-                           "in different units: m, mm"),
+    "table_of_two_units": ("a.csv", broken(make.plain_table(True), "x (mm)", "x (px)"), "",
+                           "in different units: mm, px"),
     "logger_pro_without_y": ("a.csv", broken(LOGGER, "Y (m)", "Q (m)"), "", "no column y"),
     "logger_pro_two_points": ("a.csv", LOGGER, "", "track_name: object1"),
     "nothing_moves": ("a.csv", "\n".join(["t (s),x (m),y (m)", *(f"{n / 30:.4f},0.3,2" for n in

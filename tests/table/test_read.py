@@ -556,6 +556,12 @@ def test_a_title_in_a_unit_of_time_is_the_time(title: str, tmp_path: Path) -> No
     np.testing.assert_allclose(table.seconds(None), ms / 1000)
 
 
+@pytest.mark.parametrize("title", ["v (m/s)", "v / m/s", "a (m/s^2)", "a in m/s²"])
+def test_a_column_in_the_unit_of_a_speed_is_no_place(title: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="which columns are places is not told"):
+        read(tmp_path, text(f"t (s),{title}", body=lines(columns=(0, 1))))
+
+
 def test_a_velocity_alone_is_no_place(tmp_path: Path) -> None:
     body = [f"{t},{x}" for t, x, _ in truth().T]
     with pytest.raises(InputError, match="which columns are places is not told by"):
@@ -641,6 +647,35 @@ def test_a_rate_and_a_unit_beside_named_lists(tmp_path: Path) -> None:
 def test_named_lists_that_cannot_be_read(content: str | bytes, words: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, content)
+
+
+def test_columns_in_different_units_of_length_are_read_in_one(tmp_path: Path) -> None:
+    t, x, y = truth()
+    body = [f"{a},{b},{100 * c:.2f}" for a, b, c in zip(t, x, y, strict=True)]
+    table = read(tmp_path, text("t (s),x (m),y (cm)", body=body))
+    check(table)
+    assert table.unit == "m" and table.resolution == pytest.approx((1e-4, 1e-4))
+
+
+def test_means_below_a_table_are_no_rows_of_it(tmp_path: Path) -> None:
+    after = ("Mittelwert;1,2;0,3", "Standardabweichung;0,4;0,1")
+    check(read(tmp_path, text("t;x;y", body=SEMI, after=after)))
+
+
+def test_a_table_on_its_side_is_read_by_columns(tmp_path: Path) -> None:
+    rows = zip(("t (s)", "x (m)", "y (m)"), truth(), strict=True)
+    content = "\n".join(f"{title};{';'.join(map(str, row))}" for title, row in rows)
+    check(read(tmp_path, content))
+
+
+def test_the_header_of_a_data_logger_names_no_body(tmp_path: Path) -> None:
+    """LabVIEW's: its time is X_Value, its unit stands above."""
+    head = ["LabVIEW Measurement", "Separator\tTab", "Time\t10:11:12,1", "***End_of_Header***", ""]
+    head += ["Channels\t1", "Y_Unit_Label\tcm", "X_Dimension\tTime", "***End_of_Header***"]
+    body = lines("\t", ",", columns=(0, 2))
+    table = read(tmp_path, text(*head, "X_Value\tPosition\tComment", body=body), "lvm")
+    np.testing.assert_allclose([table.clock, table.position[0, 0]], truth()[[0, 2]], atol=1e-9)
+    assert table.names == ("object1",)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 2.0])
@@ -733,7 +768,7 @@ REFUSED = {
         text("t;x;y", body=[*lines(";"), "0,84;1,5;2,5"]),
         r"the same decimal mark, point or comma, in the whole file",
     ),
-    "two_units": (text("t (s),x (m),y (mm)"), "different units: m, mm"),
+    "two_units": (text("t (s),x (m),y (px)"), "different units: m, px"),
     "an_angle_without_unit": (
         text("t,angle", body=lines(columns=(0, 1))),
         r"an angle without its unit; write \(deg\) or \(rad\)",
@@ -741,7 +776,7 @@ REFUSED = {
     "x_twice": (text("t,x,x"), "x is given twice"),
     "many_columns_of_nothing_known": (
         text(body=[f"{one},1,2,3" for one in lines()]),
-        "which columns are places is not told by no titles",
+        "which columns are places is not told; titles",
     ),
     "words_only": ("a,b\nc,d\n", "no row of numbers; line 1 has 'a', 'b'"),
     "frames_or_hundredths": (
