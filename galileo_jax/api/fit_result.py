@@ -12,6 +12,7 @@ from galileo_jax.api.export import parameter_table
 from galileo_jax.api.motion import Motion, motions_at, replaced
 from galileo_jax.api.track_doubts import (
     as_if_rolling,
+    as_in_slow_motion,
     taken_as_exact,
     with_other_angle,
     with_track_doubts,
@@ -350,8 +351,8 @@ def make_fit(
         result["no_verdict"] = "; ".join(scarce)
     friction = result["parameters"].get("k1", {}).get("mean")
     at_declared = None if "ramp_angle" in result["parameters"] else friction
-    doubts = [doubt(one, at_declared) for doubt in (with_other_angle, as_if_rolling)
-              for one in measurements]  # fmt: skip
+    asked = (with_other_angle, as_if_rolling, as_in_slow_motion)
+    doubts = [doubt(one, at_declared) for doubt in asked for one in measurements]
     if others := [text for text in doubts if text is not None]:
         result["warnings"] = [*result.get("warnings", []), *others]
     if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:

@@ -29,6 +29,10 @@ OF_ROLLING = {
 
 AS_ROLLING = 0.02  # of k1: so near to that of a body that rolls, as the angle is known
 
+SLOW_MOTION = 4.0
+"""Times as many pictures, at least, as are played. What speeds up by g (sin a - k cos a) seems to
+do so by 1 / 16 of that, as if k were at least 15 / 16 of tan a."""
+
 TAKEN = {
     "ramp_angle_deg": "ramp_angle_deg as exact",
     "pixels_per_metre": "pixels_per_metre as known to a thousandth",
@@ -156,6 +160,25 @@ def as_if_rolling(measured: Measurement, k1: float | None) -> str | None:
                 f"k1 {k_rolling:.3g}; if {item.name} rolls, write {declared}"
             )
     return None
+
+
+def as_in_slow_motion(measured: Measurement, k1: float | None) -> str | None:
+    """What to look at where a body hardly speeds up, as in slow motion; None where it does.
+
+    Friction is within a few per cent of the slope's tangent then.
+    """
+    clip = measured.clip
+    angle, scenario = clip.ramp_angle_deg, SCENARIOS[clip.scenario]
+    if k1 is None or not angle or not scenario.has_ramp or scenario.is_level:
+        return None
+    share = 1 - k1 / math.tan(math.radians(angle))
+    if not 0 < share < 1 / SLOW_MOTION**2:
+        return None
+    return (
+        f"{clip.path}: {clip.objects[0].name} speeds up by {100 * share:.2g} % of what the slope "
+        f"alone gives, as in slow motion: if the camera took more than {clip.fps:.4g} pictures a "
+        "second, say so: fps"
+    )
 
 
 def _way_px(measured: Measurement) -> float:

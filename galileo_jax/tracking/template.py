@@ -143,9 +143,10 @@ def median_template(patches: list[np.ndarray], like: Template) -> Template:
     stack = np.stack(patches)
     inside = stack[:, like.region]
     middle = np.median(inside, axis=1)
-    # More than half of a plain object's region looks the same.
-    low, high = np.quantile(inside, (0.25, 0.75), axis=1)
-    spread = (high - low) / 2 + 1e-3
+    spread = np.median(np.abs(inside - middle[:, None]), axis=1)
+    if like.is_plain:  # more than half of its region looks the same
+        spread = np.ptp(np.quantile(inside, (0.25, 0.75), axis=1), axis=0) / 2
+    spread += 1e-3
     scaled = (stack - middle[:, None, None]) / spread[:, None, None]
     scaled = scaled * np.median(spread) + np.median(middle)
     return like.renewed(np.median(scaled, axis=0).astype(np.float32))

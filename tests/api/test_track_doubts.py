@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
-from galileo_jax.api.track_doubts import FAR, as_if_rolling, taken_as_exact, with_track_doubts
+from galileo_jax.api.track_doubts import (
+    FAR,
+    as_if_rolling,
+    as_in_slow_motion,
+    taken_as_exact,
+    with_track_doubts,
+)
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
@@ -62,6 +68,15 @@ def test_a_box_as_fast_as_what_rolls_may_be_that(measured, inertia: float, what:
     assert as_if_rolling(measured, 1.05 * k1) is None
     ball = declared(measured, objects=(ClipObject(name="object1", shape="sphere"),))
     assert as_if_rolling(ball, k1) is None
+
+
+@pytest.mark.parametrize("times", [4, 8])
+def test_what_hardly_speeds_up_may_be_in_slow_motion(measured, times: int) -> None:
+    """With true friction .2, and times that are too long."""
+    tangent = math.tan(math.radians(ANGLE_DEG))
+    k1 = tangent - (tangent - 0.2) / times**2
+    assert "as in slow motion" in (as_in_slow_motion(measured, k1) or "")
+    assert as_in_slow_motion(measured, 0.2) is None
 
 
 def test_half_a_pixel_changes_k1_as_a_steeper_ramp_and_longer_lengths_would(measured) -> None:
