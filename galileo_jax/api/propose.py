@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,8 +79,8 @@ def propose(
       InputError: the video does not decode, nothing moves in it, or the camera does.
       Cancelled: `cancel` was set.
 
-    Limits: of objects that are not there in the first frame, or have no texture beside one with it,
-    those are found that fly.
+    Limits: beside an object that is there in the first frame and has texture, others are found if
+    they are and have, or if they fly.
     """
     path = Path(video)
     with progress.scope(on_progress, cancel):
@@ -94,14 +95,8 @@ def propose(
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None
         movers = [mover for mover in every if mover.flies or not mover.first_frame]
-        movers = [mover for mover in movers if not mover.leaves_picture][:2] or movers[:1]
-        if not movers and every:
-            first = every[0]
-            raise InputError(
-                f"{path}: what moves in it is not seen before picture {first.first_frame}, where "
-                f"something is at {first.point_px[0]:.0f} {first.point_px[1]:.0f}; mark the "
-                "objects by hand"
-            )
+        stay = [mover for mover in movers if not mover.leaves_picture][:2]
+        movers = stay or movers[:1] or every[:1]
         if not movers:
             raise InputError(f"{path}: nothing moves in it; mark the objects by hand")
         with progress.part(DETECTED, 1.0):
@@ -113,13 +108,13 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
     sizes = {name: _size(mover) for name, mover in zip(names, movers, strict=True)}
     objects = {name: mover.point_px for name, mover in zip(names, movers, strict=True)}
     direction: Direction = "right" if movers[0].goes_right else "left"
+    later = {n: m.first_frame for n, m in zip(names, movers, strict=True) if m.first_frame}
     if movers[0].flies:
-        later = {n: m.first_frame for n, m in zip(names, movers, strict=True) if m.first_frame}
         return Proposal("flight", fps, objects, sizes, direction, first_frames=later)
     doubts: list[str] = []
     for scenario in ("ramp", "incline"):
         seen = {n: objects[n] for n in (names if scenario == "ramp" else names[:1])}
-        content = _content(path, scenario, direction, fps, seen, sizes)
+        content = _content(path, scenario, direction, fps, seen, sizes, later)
         try:
             found = measure(check_clip(path.with_suffix(".yaml"), content)).clip
         except InputError as error:
@@ -132,9 +127,13 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
         assert found.frame_size_px is not None  # of a video
         edge = EDGE_SHARE * found.frame_size_px[0]
         if len(seen) > 1 or foot is None or edge < foot[0] < found.frame_size_px[0] - edge:
-            return Proposal(scenario, fps, seen, standing, found.direction, ramp, foot)
+            return Proposal(
+                scenario, fps, seen, standing, found.direction, ramp, foot, first_frames=later
+            )
         # It is stopped at the picture's edge rather than going on along a table.
-    return Proposal("ramp", fps, objects, sizes, direction, doubts=(doubts[0],))
+    return Proposal(
+        "ramp", fps, objects, sizes, direction, doubts=(doubts[0],), first_frames=later
+    )
 
 
 def _content(
@@ -144,12 +143,14 @@ def _content(
     fps: float,
     objects: dict[str, Point],
     sizes: dict[str, Point],
+    first_frames: Mapping[str, int],
 ) -> dict[str, Any]:
     listed = []
     for name, point in objects.items():
         width, height = (side / SCALE for side in sizes[name])
-        size = [width, width, height]
+        size, first = [width, width, height], first_frames.get(name, 0)
         listed.append({"name": name, "shape": "box", "size_m": size, "point_px": list(point)})
+        listed[-1] |= {"first_frame": first} if first else {}
     return {
         "video": path.name,
         "scenario": scenario,

@@ -10,6 +10,7 @@ import pytest
 
 from galileo_jax import __main__
 from galileo_jax.api.propose import propose
+from galileo_jax.api.understand import understand
 from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
 from tests.api.test_understand import filmed
@@ -102,11 +103,14 @@ def test_a_table_of_temperatures(titles, row, said, more, tmp_path, monkeypatch,
 
 
 @pytest.mark.video
-def test_a_film_whose_thing_shows_later_says_where(tmp_path, monkeypatch, capsys):
-    """Not that nothing moves in it."""
+def test_a_thing_that_shows_later_is_followed_from_then_on(tmp_path):
+    """As what a hand covers in the first picture."""
     t = np.clip((np.arange(60) - 20) / 30, 0.0, None)
     way = np.stack([60 + 90 * t**2, 50 + 40 * t**2, np.zeros(60)], axis=1)
     way[:12] = [-300.0, -300.0, 0.0]
-    told = said_of(filmed(tmp_path, way), monkeypatch, capsys, *SAID)
-    assert "nothing moves" not in told and "--point X Y" in told
-    assert "what moves in it is not seen before picture" in told
+    known = understand(filmed(tmp_path, way))
+    (point,) = known.things
+    first = known.first_frame(point)
+    assert 12 <= first <= 24
+    np.testing.assert_allclose(point, way[first, :2], atol=3.0)
+
