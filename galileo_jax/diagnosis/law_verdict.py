@@ -42,15 +42,20 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
     """The verdict where a formula explains the data about as well as what it is about, or better.
 
     One effect is ambiguous then, with the formula; two at once, or one that is far behind the
-    formula, are not worth naming. All else stays.
+    formula, are not worth naming. Where only a form explains the data, the verdict is about the
+    best effect with a name: the formula that says what the form does has to beat it. All else
+    stays.
     """
-    law = _best_law(candidates)
-    own = next((c for c in candidates if c.name in joined_names(verdict)), None)
+    law, names = _best_law(candidates), joined_names(verdict)
+    if verdict.form is not None and explains(best := best_named(candidates)):
+        names = (best.name,)
+    own = next((c for c in candidates if c.name in names), None)
     if law is None or own is None or own.log_odds - law.log_odds >= decisive:
         return verdict
     if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
         return replace(verdict, status="unknown", effects=())
-    return replace(verdict, status="ambiguous", law=law.law)
+    effects = verdict.effects or names
+    return replace(verdict, status="ambiguous", effects=effects, form=None, law=law.law)
 
 
 def best_formula(candidates: Sequence[Candidate]) -> Candidate | None:

@@ -113,4 +113,3 @@ def test_a_thing_that_shows_later_is_followed_from_then_on(tmp_path):
     first = known.first_frame(point)
     assert 12 <= first <= 24
     np.testing.assert_allclose(point, way[first, :2], atol=3.0)
-

@@ -153,6 +153,22 @@ def test_what_a_formula_explains_as_well_is_contested(effects, ahead, expected):
     assert contested_by_law(named, ranked([own, law(50.0, 0.001)]), DECISIVE) == named
 
 
+@pytest.mark.parametrize(
+    ("p_value", "behind", "expected"),
+    [(0.5, DECISIVE - EDGE, "ambiguous"), (0.5, DECISIVE, "unknown"), (0.001, 1.0, "unknown")],
+)
+def test_a_form_that_leads_is_no_reason_to_hide_what_its_formula_does_not_beat(
+    p_value, behind, expected
+):
+    """The form has no prior of a formula."""
+    only_a_form = Verdict("unknown", (), FORM_OF_PULSE_T)
+    form, formula = candidate(FORM_OF_PULSE_T, 52.0), law(50.0, family="pulse_t")
+    own = candidate("friction_patch", 50.0 - behind, p_value)
+    found = contested_by_law(only_a_form, ranked([form, formula, own]), DECISIVE)
+    assert found.status == expected
+    assert found.effects == (("friction_patch",) if expected == "ambiguous" else ())
+
+
 def test_formulas_are_tried_where_nothing_explains_or_only_what_could_explain_much():
     patch = replace(candidate("friction_patch", 60.0), num_constants=3)
     two = replace(candidate("stribeck", 60.0), num_constants=2)
