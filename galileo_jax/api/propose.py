@@ -131,9 +131,7 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
                 scenario, fps, seen, standing, found.direction, ramp, foot, first_frames=later
             )
         # It is stopped at the picture's edge rather than going on along a table.
-    return Proposal(
-        "ramp", fps, objects, sizes, direction, doubts=(doubts[0],), first_frames=later
-    )
+    return Proposal("ramp", fps, objects, sizes, direction, doubts=(doubts[0],), first_frames=later)
 
 
 def _content(

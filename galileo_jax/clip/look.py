@@ -26,6 +26,10 @@ PER_TURN, STILL, SAME_SIGN = 8, 0.1, 0.7
 """Places between two turns that show how they are bent; bends smaller by so much are none; which
 share of them has the same sign where something bounces: half do where it swings."""
 
+MIN_NEIGHBOURS, STRAY, MANY = 8, 0.05, 10.0
+"""Places at least; a place that was marked wrongly is off its neighbours by more than this share of
+the way, and by so many times as much as the others."""
+
 FALL_M_S2 = (7.0, 12.0)  # what a fall accelerates with, air and a camera that is not level in it
 GAP = 1.5  # of the usual step
 
@@ -133,8 +137,19 @@ def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) 
     return Likely("incline", f"one coordinate{told}")
 
 
+def _without_strays(values: np.ndarray) -> np.ndarray:
+    """A coordinate in which single places that lie far off their neighbours are as these are."""
+    if len(values) < MIN_NEIGHBOURS:
+        return values
+    beside = np.median([values[:-2], values[1:-1], values[2:]], axis=0)
+    off = np.abs(values[1:-1] - beside)
+    is_stray = off > np.maximum(STRAY * np.ptp(values), MANY * np.median(off))
+    return np.concatenate([values[:1], np.where(is_stray, beside, values[1:-1]), values[-1:]])
+
+
 def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     """The likeliest scenario of one object's path in a plane, in any unit and without a clock."""
+    x, y = _without_strays(x), _without_strays(y)
     along = x if np.ptp(x) >= np.ptp(y) else y
     turns = len(_turning(along))
     straight, degrees = _straight(x, y)

@@ -29,6 +29,7 @@ ASKEW_DEG = 45.0
 
 MOST_SCATTER = 0.3  # of gravity: what scatters more from window to window is no fall
 MOST_OUT_OF_PLANE = 0.1
+LESS_THAN_ROUND = 1 / 3  # of its radius: the middle of what goes all round is nearer to the pivot
 
 
 def observed_where_finite(
@@ -307,7 +308,8 @@ def _check_hangs_down(of: DeclaredTrack, place_m: np.ndarray) -> None:
     """Raises `InputError` where the pivot of an arc `[2, row]` lies aside of it, not above."""
     arc = circle(*place_m)
     x, y = place_m.mean(axis=1) - arc.centre
-    if arc.is_told and abs(x) > abs(y):
+    is_arc = math.hypot(x, y) > LESS_THAN_ROUND * arc.radius
+    if arc.is_told and is_arc and abs(x) > abs(y):
         side, up = ("+x", "-x") if x > 0 else ("-x", "x")
         raise of.wrong_key(
             f"{of.path.name} is an arc that hangs along {side}; are x and y swapped? write "

@@ -18,7 +18,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG, MIN_POINTS, falls_deg
-from galileo_jax.numerics.least_squares import line_through
+from galileo_jax.numerics.least_squares import circle, line_through
 from galileo_jax.observation.observation import Observation
 
 CLEAR = 4.0
@@ -26,6 +26,7 @@ TURNED_DEG = 6.0
 NEARER = 3.0  # by so many times an axis of a table must be nearer to the path than the declared way
 STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
+EVEN = 0.2  # of its mean, by which the rate of a turn scatters that is even
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,18 @@ def rises_forward(clip: Clip, observation: Observation) -> bool:
     return rises >= MIN_RAMP_ANGLE_DEG and (declared is None or abs(rises - declared) < TURNED_DEG)
 
 
+def _goes_round(times_s: np.ndarray, place: np.ndarray) -> bool:
+    """Whether a path `[2, frame]` is a whole circle that is passed through evenly."""
+    round_it = circle(*place)
+    if not round_it.is_told:
+        return False
+    x, y = place - np.array(round_it.centre)[:, None]
+    angle = np.unwrap(np.arctan2(y, x))
+    rate = np.gradient(angle, times_s)
+    is_even = np.std(rate) < EVEN * abs(np.mean(rate))
+    return bool(is_even and np.ptp(angle) > 2 * math.pi)
+
+
 def _turn_between(one_deg: float, other_deg: float, period_deg: float) -> float:
     """The smallest turn from the second direction to the first, of those a period apart."""
     return (one_deg - other_deg + period_deg / 2) % period_deg - period_deg / 2
@@ -156,6 +169,11 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
             f"{clip.path}: {name} goes across by {abs(across):.3g} m, farther than down, and "
             "what falls goes down: mark the thing that is meant (`--point X Y`), or turn the film "
             "if its camera lay on its side"
+        )
+    if _goes_round(observation.times_s[seen], place):
+        return (
+            f"{clip.path}: {name} goes round and round at an even speed; what hangs on a thread is "
+            "slower above than below (is it seen from above, where nothing hangs?)"
         )
     if likely.scenario not in ("incline", "fall") or not likely.is_clear:
         return None

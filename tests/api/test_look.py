@@ -142,3 +142,26 @@ def test_a_table_of_any_name_is_a_table(name: str, tmp_path: Path) -> None:
     text = "\n".join(f"{t:.4f}\t{s:.2f}" for t, s in rows)
     path.write_text(json.dumps(rows) if name.endswith("json") else text)
     assert gx.look(path).seen.num_rows == 20
+
+
+@pytest.mark.parametrize("strays", [(), (11,), (7, 19)])
+def test_a_place_that_was_marked_wrongly_makes_no_swing_of_a_throw(strays, tmp_path: Path) -> None:
+    x, y = 2 * T, 3 * T - 4.905 * T**2
+    for n in strays:
+        x[n], y[n] = x[n] - 0.8, y[n] + 0.5
+    found = look(write(tmp_path / "a.csv", "t (s);x (m);y (m)", T, x, y))
+    assert found.seen is not None and found.seen.scenario == "flight"
+
+
+def test_one_coordinate_that_is_thrown_back_falls(tmp_path: Path) -> None:
+    """As a ball's height, which was held at first."""
+    times = np.arange(150) / 50
+    height, speed, place = 1.1, 0.0, []
+    for now in times:
+        place.append(height)
+        for _ in range(20 if now > 0.5 else 0):
+            height, speed = height + 1e-3 * speed, speed - 9.81e-3
+            if height < 0 and speed < 0:
+                height, speed = -height, -0.8 * speed
+    found = look(write(tmp_path / "a.csv", "Time (s);Height (m)", times, np.array(place)))
+    assert found.seen is not None and (found.seen.scenario, found.seen.bounces) == ("fall", True)

@@ -202,3 +202,23 @@ def test_a_throw_that_is_declared_as_a_fall_is_said_before_its_gravity(tmp_path)
     )
     said = measure(load_clip(tmp_path / "a.yaml")).impossible
     assert said is not None and "perhaps scenario: flight" in said
+
+
+@pytest.mark.parametrize(("share", "is_said"), [(0.0, True), (1.0, False)])
+def test_a_circle_seen_from_above_is_no_pendulum(share: float, is_said: bool, tmp_path):
+    """Of what hangs, and goes over the top, the speed tells above from below."""
+    t, angle, rate = np.arange(60) / 30, [0.0], 11.0
+    length = 0.4
+    for _ in t[1:]:
+        for _ in range(20):
+            rate -= share * 9.81 / length * math.sin(angle[-1]) / 600
+            angle[-1] += rate / 600
+        angle.append(angle[-1])
+    x, y = length * np.sin(angle), -length * np.cos(angle)
+    rows = "\n".join(f"{a:.4f},{b:.4f},{c:.4f}" for a, b, c in zip(t, x, y, strict=True))
+    (tmp_path / "a.csv").write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    (tmp_path / "a.yaml").write_text(
+        "track: a.csv\nscenario: pendulum\ntrack_y: up\nobjects: [{name: object1, shape: sphere}]\n"
+    )
+    said = measure(load_clip(tmp_path / "a.yaml")).impossible
+    assert ("round and round" in (said or "")) == is_said
