@@ -14,7 +14,7 @@ from galileo_jax.clip.declared_track import DeclaredTrack
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.track_noise import told_noise_m
-from galileo_jax.numerics.least_squares import circle
+from galileo_jax.numerics.least_squares import circle, line_through
 from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from galileo_jax.runtime.errors import named
 from galileo_jax.table.track_table import TrackTable
@@ -30,6 +30,25 @@ ASKEW_DEG = 45.0
 MOST_SCATTER = 0.3  # of gravity: what scatters more from window to window is no fall
 MOST_OUT_OF_PLANE = 0.1
 LESS_THAN_ROUND = 1 / 3  # of its radius: the middle of what goes all round is nearer to the pivot
+
+
+def _turned_level(table: TrackTable, across: str, aside: str) -> tuple[TrackTable, float]:
+    """The table turned about the upright so that object 1 goes along one axis, and by how much.
+
+    As it is, and 0 degrees, where it goes along that axis, or along no straight line.
+    """
+    level = [table.axes.index(across), table.axes.index(aside)]
+    points = table.position[0, level]
+    points = points[:, np.isfinite(points).all(axis=0)]
+    if points.shape[1] < MIN_POINTS or np.ptp(points[1]) <= MOST_OUT_OF_PLANE * np.ptp(points[0]):
+        return table, 0.0
+    line = line_through(points)
+    if np.ptp(line.across @ points) > MOST_OUT_OF_PLANE * np.ptp(line.along @ points):
+        return table, 0.0
+    position = table.position.copy()
+    turn = np.stack([line.along, line.across])
+    position[:, level] = np.einsum("ab,obt->oat", turn, table.position[:, level])
+    return replace(table, position=position), math.degrees(math.atan2(*line.along[::-1]))
 
 
 def observed_where_finite(
@@ -133,6 +152,12 @@ def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[st
         up, others = "z", ["x", "y"]
         said = (f"{of.path}: z is taken as up, for it does not move along y (`track_up`)",)
     across = max(others, key=lambda axis: spread[axis])
+    if is_upright and (aside := [axis for axis in others if axis != across]):
+        table, turned_deg = _turned_level(table, across, aside[0])
+        if turned_deg:
+            said += (f"{of.path}: the motion is in a plane {turned_deg:.0f} degrees from {across} "
+                     f"to {aside[0]}; ways are along that",)  # fmt: skip
+            spread[aside[0]] = 0.0
     for axis in others:
         if axis == across:
             continue

@@ -103,7 +103,7 @@ def split_heading(rows: Rows) -> Heading:
     body = [(line, row) for line, row in body if at < 0 or row != above[at][1]]
     titles = _with_clock_above(titles, [row for _, row in above[: max(at, 0)]])
     units = next((row for _, row in above if _is_units(row)), [])
-    ends = [n for n, (_, row) in enumerate(above) if row[0].startswith(END_OF_HEADER)]
+    ends = [n for n, (_, row) in enumerate(above) if "".join(row[:1]).startswith(END_OF_HEADER)]
     over = [
         row
         for line, row in above[max(ends, default=-1) + 1 : max(at, 0)]

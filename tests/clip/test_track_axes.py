@@ -247,3 +247,14 @@ def test_a_way_alone_is_asked_whether_it_rises_or_sinks(tmp_path: Path):
     assert down.position_m[0, 1, -1] < down.position_m[0, 1, 0]
     up = observed(tmp_path, {"time_s": T, "y_m": -depth + NOISE[0]}, keys)
     assert up.position_m[0, 1, -1] < up.position_m[0, 1, 0]
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 35.0, -50.0])
+def test_a_throw_askew_to_the_axes_of_a_room_is_one_in_its_plane(turn_deg, tmp_path: Path) -> None:
+    """As motion capture gives it, y up."""
+    way, height = 2.3 * T, 1 + 3 * T - 4.905 * T**2
+    x, z = (way * one(np.radians(turn_deg)) for one in (np.cos, np.sin))
+    columns = {"t (s)": T, "x (m)": x + NOISE[0], "y (m)": height, "z (m)": z + NOISE[1]}
+    found = observed(tmp_path, columns, "scenario: flight")
+    gone = found.position_m[0] - found.position_m[0][:, :1]
+    np.testing.assert_allclose(gone, [way, height - 1], atol=2e-3)
