@@ -141,7 +141,8 @@ def test_a_table_of_any_name_is_a_table(name: str, tmp_path: Path) -> None:
     rows = [[n / 30, 0.5 * n**2] for n in range(20)]
     text = "\n".join(f"{t:.4f}\t{s:.2f}" for t, s in rows)
     path.write_text(json.dumps(rows) if name.endswith("json") else text)
-    assert gx.look(path).seen.num_rows == 20
+    seen = gx.look(path).seen
+    assert seen is not None and seen.num_rows == 20
 
 
 @pytest.mark.parametrize("strays", [(), (11,), (7, 19)])

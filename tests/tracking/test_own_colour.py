@@ -22,7 +22,8 @@ def paths() -> tuple[np.ndarray, np.ndarray]:
     step = np.arange(40) - HIT
     first = AT_PX + np.where(step < 0, 6.3 * step, 2.9 * step - 0.05 * step**2)
     second = np.where(step < 0, AT_PX, first) + SIDES[0]
-    return tuple(np.stack([x, np.full(40, 120.0)], axis=1) for x in (first, second))
+    level = np.full(40, 120.0)
+    return np.stack([first, level], axis=1), np.stack([second, level], axis=1)
 
 
 def filmed(*colours: tuple[int, int, int], noise: float = 2.0) -> list[np.ndarray]:
