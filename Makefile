@@ -28,7 +28,7 @@ demo: $(CORE)
 
 # Two processes: one that has compiled all programs of 3,000 tests runs out of memory mappings
 # (Linux gives it 65,530) and dies.
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --durations=20
 
 test: $(READY)
 	$(PYTEST) -m "not slow"

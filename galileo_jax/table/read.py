@@ -190,6 +190,10 @@ def _check_one_clock(columns: Columns) -> None:
     times, places = columns.of("time"), [n for role in PLACES for n in columns.of(role)]
     each = pairwise([*times, len(columns.meanings)])
     clocks = [n for n, end in each if any(n < at < end for at in places)]
+    if not clocks and len(places) == 1 and len(times) > 2:  # stopped by hand, again and again
+        raise InputError(
+            f"{len(times)} times for each place; a table of places, each at a time, expected"
+        )
     for first, n in pairwise(clocks):
         one, other = (columns.numbers[at].values * _per_unit(columns, at) for at in (first, n))
         both = np.isfinite(one) & np.isfinite(other)

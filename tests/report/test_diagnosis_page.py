@@ -182,7 +182,7 @@ def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
     first = replace(found.candidates[0], law=law)
     verdict = replace(found.verdict, effects=("viscous_drag",), law=law)
     found = replace(found, candidates=(first, *found.candidates[1:]), verdict=verdict)
-    said = f"cannot distinguish between viscous_drag and {law.text}; each of them explains"
+    said = f"cannot distinguish between viscous_drag and the formula ({law.text}); each of them"
     assert said in diagnosis_text.verdict(found)
     page = tmp_path / "report.html"
     write_page(page, trials, found, clip)

@@ -774,6 +774,10 @@ REFUSED = {
         r"an angle without its unit; write \(deg\) or \(rad\)",
     ),
     "x_twice": (text("t,x,x"), "x is given twice"),
+    "times_of_a_stopwatch": (
+        "Height (m),t1 (s),t2 (s),t3 (s)\n0.5,0.32,0.27,0.32\n1.0,0.42,0.45,0.48\n",
+        "3 times for each place",
+    ),
     "many_columns_of_nothing_known": (
         text(body=[f"{one},1,2,3" for one in lines()]),
         "which columns are places is not told; titles",
