@@ -254,7 +254,7 @@ def _likely(clip: Clip, factor: float, found: ApparentGravity) -> str:
         return f"likely fps: {best:g}"
     return (
         f"no usual rate explains that, lengths {factor**2:.3g} times as long would: check the unit "
-        "of length, the axes and what was followed"
+        "of length, the axes, what was followed, and `gravity` if it is another"
     )
 
 

@@ -16,6 +16,7 @@ from galileo_jax.table.numbers import Rows, is_nothing, is_number
 from galileo_jax.table.spreadsheet import MAX_ROWS, is_spreadsheet, spreadsheet_rows
 from galileo_jax.table.text import content_of, decoded
 from galileo_jax.table.titles import parted_unit
+from galileo_jax.table.web_page import web_table
 
 SEPARATORS = ("\t", ";", ",", ", ", "|", " ")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,|])\s*", re.IGNORECASE)  # Excel's own first line
@@ -44,7 +45,7 @@ def cells_of(content: bytes) -> Rows:
         return _checked(listed)
     text = decoded(content)
     if text.lstrip()[:1] == "<":
-        raise InputError("a web page, or XML; save its table as csv or as a spreadsheet")
+        return _checked(web_table(text))
     rows = _split(_lines(text))
     is_alone = all(not any(row[1:]) for _, row in rows)
     if is_alone and any(mark in row[0] for _, row in rows for mark in "\t;,"):

@@ -29,11 +29,14 @@ MAX_BYTES = 50_000_000
 MAX_ROLL_DEG = 5.0
 """A camera is held level within this; axes turned further were laid along a slope."""
 
+HEAD_BYTES = 1000  # in which a web page says that it is one
+
 
 def is_trk(content: bytes) -> bool:
-    """Whether a file is XML, or an archive with a tab of Tracker."""
-    start = content[:200].removeprefix(b"\xef\xbb\xbf").lstrip()
-    return start.startswith((b"<?xml", b"<object", b"<!DOCTYPE", b"PK\x03\x04"))
+    """Whether a file is XML, but no web page, or an archive with a tab of Tracker."""
+    start = content[:HEAD_BYTES].removeprefix(b"\xef\xbb\xbf").lstrip()
+    is_page = b"<html" in start.lower()
+    return start.startswith((b"<?xml", b"<object", b"<!DOCTYPE", b"PK\x03\x04")) and not is_page
 
 
 def read_trk(content: bytes) -> TrackTable:

@@ -678,6 +678,18 @@ def test_the_header_of_a_data_logger_names_no_body(tmp_path: Path) -> None:
     assert table.names == ("object1",)
 
 
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_table_of_a_web_page(is_closed: bool, tmp_path: Path) -> None:
+    """Ends of cells and rows may be left out there."""
+    cell, row = ("</td>", "</tr>") if is_closed else ("", "")
+    body = "".join(
+        f"<tr>{''.join(f'<td><b>{value}</b>{cell}' for value in line)}{row}\n"
+        for line in (("t (s)", "x (m)", "y (m)"), *truth().T)
+    )
+    page = f"<!DOCTYPE html><html><p>1,2,3</p><table border=1>{body}</table><p>4 &lt; 5</p></html>"
+    check(read(tmp_path, page, "xls"))
+
+
 @pytest.mark.parametrize("late_s", [0.0, 2.0])
 def test_runs_of_one_coordinate_side_by_side(late_s: float, tmp_path: Path) -> None:
     """Numbered, each with its own clock, that may go on in step with the others'."""
@@ -774,6 +786,7 @@ REFUSED = {
         r"an angle without its unit; write \(deg\) or \(rad\)",
     ),
     "x_twice": (text("t,x,x"), "x is given twice"),
+    "web_page": ("<!DOCTYPE html><html><p>1,2</p></html>", "a web page without a table"),
     "times_of_a_stopwatch": (
         "Height (m),t1 (s),t2 (s),t3 (s)\n0.5,0.32,0.27,0.32\n1.0,0.42,0.45,0.48\n",
         "3 times for each place",
