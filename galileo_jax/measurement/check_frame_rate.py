@@ -79,7 +79,7 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     name, more = observation.names[0], "at least " if found.is_least else ""
     error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (
-        f"{clip.path}: fps: {clip.fps:g}, but from {name}'s path gravity would be {more}"
+        f"{clip.path}: fps: {clip.fps:.4g}, but from {name}'s path gravity would be {more}"
         f"{found.value:.3g}{error} m/s^2, not {clip.gravity:g}; {likely}"
     )
     if clip.pixels_per_metre is not None:
