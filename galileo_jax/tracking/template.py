@@ -44,7 +44,7 @@ class Template:
     image: np.ndarray
     region: np.ndarray
     moved: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    is_plain: bool = False  # known by its edge alone
+    is_plain: bool = False  # known by its edge alone, in a colour of its own
     _sharp: dict[float, Target] = field(default_factory=dict, repr=False)
 
     @property
@@ -109,8 +109,9 @@ def template_at(
 
     if outline.size_px is not None:
         core = cut(outline, CORE_SHARE)
-        is_by_edge = by_edge or is_plain(core)
-        return replace(cut(outline, RIM_SHARE), is_plain=True) if is_by_edge else core
+        if by_edge:
+            return replace(cut(outline, RIM_SHARE), is_plain=True)
+        return cut(outline, RIM_SHARE) if is_plain(core) else core
     windows = [cut(Outline((side, side), outline.angle_rad), 1.0) for side in WINDOWS_PX]
     return next((one for one in windows if not is_plain(one)), windows[0])
 
