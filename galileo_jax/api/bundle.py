@@ -22,10 +22,7 @@ import yaml
 from galileo_jax.api.clips import ClipLike
 from galileo_jax.api.look import look
 from galileo_jax.clip.file_kinds import YAML_SUFFIXES
-from galileo_jax.clip.load import (
-    load_clip,
-    yaml_of,
-)
+from galileo_jax.clip.load import load_clip, yaml_of
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import write_observation_csv

@@ -21,11 +21,7 @@ from galileo_jax.api.proposed_clip import clip_of, placed
 from galileo_jax.api.track import TrackLike, tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
 from galileo_jax.clip.file_kinds import FILM_SUFFIXES, TRACK_SUFFIXES, is_track, is_yaml
-from galileo_jax.clip.load import (
-    find_yaml,
-    has_yaml,
-    load_clip,
-)
+from galileo_jax.clip.load import find_yaml, has_yaml, load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of

@@ -146,9 +146,8 @@ def _content(
     listed = []
     for name, point in objects.items():
         width, height = (side / SCALE for side in sizes[name])
-        size, first = [width, width, height], first_frames.get(name, 0)
-        listed.append({"name": name, "shape": "box", "size_m": size, "point_px": list(point)})
-        listed[-1] |= {"first_frame": first} if first else {}
+        seen = {"point_px": list(point), "first_frame": first_frames.get(name, 0)}
+        listed.append({"name": name, "shape": "box", "size_m": [width, width, height], **seen})
     return {
         "video": path.name,
         "scenario": scenario,

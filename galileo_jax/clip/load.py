@@ -16,10 +16,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.schema_errors import first_problem, unknown_key
 from galileo_jax.clip.sources import source_of
-from galileo_jax.clip.track_file import (
-    FileTrack,
-    read_track,
-)
+from galileo_jax.clip.track_file import FileTrack, read_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known

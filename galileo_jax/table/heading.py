@@ -134,14 +134,11 @@ def _upright(rows: Rows) -> Rows:
     """The rows, or of a table that lies on its side the columns: each of its rows has a title."""
     if len(rows) >= len(rows[0][1]) or len({len(row) for _, row in rows}) > 1:
         return rows
-    roles = {title_of(row[0]).role for _, row in rows}
-    if not roles & {"time", "frame"} or not all(
-        _is_value(c) or is_nothing(c) for _, row in rows for c in row[1:]
-    ):
+    columns = list(zip(*(row for _, row in rows), strict=True))
+    is_timed = any(title_of(title).role in ("time", "frame") for title in columns[0])
+    if not is_timed or not all(_is_value(one) or is_nothing(one) for one in chain(*columns[1:])):
         return rows
-    return [
-        (n, list(cells)) for n, cells in enumerate(zip(*(row for _, row in rows), strict=True), 1)
-    ]
+    return [(n, list(cells)) for n, cells in enumerate(columns, 1)]
 
 
 def _units_in_a_row(rows: Rows) -> Rows:
@@ -153,14 +150,14 @@ def _units_in_a_row(rows: Rows) -> Rows:
         if len(units) == 1 and (unit := units.pop()):
             behind[n] = unit
 
+    if not behind:
+        return rows
+
     def bare(row: list[str]) -> list[str]:
-        return [number if (number := parted_unit(cell)[0]) and behind.get(n) else cell
-                for n, cell in enumerate(row)]  # fmt: skip
+        return [(n in behind and parted_unit(cell)[0]) or cell for n, cell in enumerate(row)]
 
     found = [(line, bare(row)) for line, row in rows]
-    first = next((n for n, (_, row) in enumerate(rows) if found[n][1] != row), None)
-    if first is None:
-        return rows
+    first = next(n for n, (_, row) in enumerate(rows) if found[n][1] != row)
     units = (found[first][0], [behind.get(n, "") for n in range(max(behind) + 1)])
     return [*found[:first], units, *found[first:]]
 

@@ -13,8 +13,6 @@ from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat, whosmat
-from scipy.io.matlab import mat_struct
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.numbers import Rows
@@ -76,6 +74,8 @@ def _titles(paths: list[Path]) -> list[str]:
 
 def _matlab(content: bytes) -> Any:
     """The variables of a file; a structure as a dictionary."""
+    from scipy.io import loadmat, whosmat  # a third of a second, which other tables do not need
+
     try:
         sizes = [int(np.prod(shape)) for _, shape, _ in whosmat(io.BytesIO(content))]
         _check_size(sum(sizes))
@@ -92,7 +92,7 @@ def _matlab(content: bytes) -> Any:
 
 def _plain(value: Any) -> Any:
     """Structures as dictionaries, arrays as lists of rows."""
-    if isinstance(value, mat_struct):
+    if hasattr(value, "_fieldnames"):  # a structure
         return {name: _plain(one) for name, one in vars(value).items() if name[0] != "_"}
     if isinstance(value, np.ndarray):
         return [_plain(one) for one in value] if value.dtype == object else value.tolist()

@@ -74,8 +74,8 @@ def _table(columns: Columns) -> TrackTable:
     lines = [line for line, _ in columns.heading.body]
     clock, resolution_s = _clock(columns, lines)
     is_in_frames = not columns.of("time")
-    names, axes, places, resolution = _places(columns)
     unit = _unit(columns)
+    names, axes, places, resolution = _places(columns, unit)
     warnings, ids = list(columns.warnings), columns.of("object")
     if ids:
         if clock is None:
@@ -206,9 +206,9 @@ def _check_one_clock(columns: Columns) -> None:
 
 
 def _places(
-    columns: Columns,
+    columns: Columns, unit: str | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray, tuple[float, ...]]:
-    """Names, axes, `[object, axis, row]`, and the resolution of each axis."""
+    """Names, axes, `[object, axis, row]` in a unit of length, and the resolution of each axis."""
     by_name = _columns_by_name(columns)
     first_name, first = next(iter(by_name.items()))
     axes = tuple(role for role in PLACES if role in first)
@@ -217,7 +217,6 @@ def _places(
         lacking += [(role, first_name) for role in of if role not in axes]
         for role, who in lacking:
             raise InputError(f"no column {role} of {who[:40]!r}; all objects have the same ones")
-    unit = _unit(columns)
     numbers = [[_in_unit(columns, of[role], unit) for role in axes] for of in by_name.values()]
     places = np.array([[one.values for one in row] for row in numbers])
     for index, name in enumerate(by_name):

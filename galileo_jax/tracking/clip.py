@@ -123,7 +123,7 @@ def _movers(clip: Clip, open_frames: OpenFrames, advance: Callable[[], None]) ->
             axes_angle_rad=_ramp_angle_rad(clip),
             may_fly=not SCENARIOS[clip.scenario].has_surface,
             outlined=None in sizes,
-            wanted=max(sum(item.point_px is None for item in clip.objects), 1),
+            wanted=sum(item.point_px is None for item in clip.objects),
             advance=advance,
         )
     except CameraMovesError as error:

@@ -83,8 +83,8 @@ def find_movers(
       axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle).
       may_fly: whether something may, which is looked for then.
       outlined: whether outlines of what has features are looked for.
-      wanted: how many things are asked for; where fewer have features, or fly, silhouettes that go
-        farthest are the others.
+      wanted: how many things are asked for, one at least; where fewer have features, or fly, the
+        silhouettes that go farthest are the others.
       advance: called after every frame.
 
     Raises:
@@ -101,7 +101,7 @@ def find_movers(
     if _whole_picture_moves(path, onset, size_px):
         raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     groups = _groups(path, onset, span_px)
-    looks_on = may_fly or len(groups) < wanted
+    looks_on = may_fly or len(groups) < max(wanted, 1)
     some = some_frames(open_frames, len(path)) if looks_on or outlined else {}
     ways = paths_of(open_frames, np.arange(len(path)), some) if looks_on else []
     ways = [one for one in ways if len(one.parts) >= LEAST_SEEN]
@@ -125,7 +125,7 @@ def find_movers(
         )
     others = [one for one in ways if not _flies(one) and one.way_px >= one.parts[0].size_px]
     others = sorted(others, key=lambda one: -one.way_px)
-    lacking = max(wanted - len(movers) - len(flying), 0)
+    lacking = max(max(wanted, 1) - len(movers) - len(flying), 0)
     movers += [_silhouette(one, len(path)) for one in (*flying, *others[:lacking])]
     return sorted(movers, key=lambda one: (not one.flies, one.leaves_picture, one.onset_frame))
 

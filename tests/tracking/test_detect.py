@@ -52,6 +52,17 @@ def test_a_small_ball_in_fast_flight_is_found_by_its_silhouette(first: int):
     np.testing.assert_allclose(mover.point_px, flight[first, :2], atol=1.5)
 
 
+@pytest.mark.parametrize("wanted", [0, 1])
+def test_a_silhouette_alone_is_found_though_none_is_asked_for(wanted: int):
+    """Its outline is, where all are marked and their sizes are not known."""
+    time = np.arange(12.0)
+    path = np.stack([25 + 24.0 * time, 80 + 0 * time, 0 * time], axis=1)
+    frames = film([(Box((10, 10), seed=3), path)], size_px=(320, 160))
+    (mover,) = find_movers(lambda: iter(frames), 32, may_fly=False, wanted=wanted)
+    assert not mover.num_features
+    np.testing.assert_allclose(mover.point_px, path[0, :2], atol=1.5)
+
+
 def test_a_thing_whose_middle_is_plain_is_one_thing():
     left, _, _ = paths()
     right = left + np.array([52.0, 0, 0])

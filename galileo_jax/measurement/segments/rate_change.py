@@ -71,9 +71,9 @@ def _parabola(path: PointPath, middle_s: float) -> _Parabola:
 
 
 def _from_rest(path: PointPath, middle_s: float) -> _Parabola:
-    """Of what is at rest until it is let go; its velocity is the acceleration times the time since.
+    """Of what is at rest until it is let go: place + acceleration since^2 / 2, since >= 0.
 
-    By Gauss's steps' last slopes, of the place of rest, the acceleration, and when it is let go.
+    When it is let go is looked for; the errors are by the slopes of all three.
     """
     times, place = path.times_s, path.place_m.T
     starts = np.linspace(times[1], times[-2], STARTS * len(path))
