@@ -8,13 +8,10 @@ which is largest for the first eigenvector of D. An orange ball before a wall as
 in grey.
 """
 
-from collections.abc import Iterator
-
-import cv2
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.tracking.picture import OpenFrames, some_frames
+from galileo_jax.tracking.picture import OpenFrames, mixture, some_frames
 
 GREY = np.array([0.114, 0.587, 0.299])  # of blue, green, red, as `template.grey` mixes them
 WIDTH_PX = 320  # frames are made so small
@@ -33,13 +30,8 @@ def in_contrast(open_frames: OpenFrames, count: int) -> OpenFrames:
     weights = _weights(open_frames, count)
     if weights is None:
         return open_frames
-    lowest = 255.0 * np.minimum(weights, 0.0).sum()
-    mixed = np.array([[*weights, -lowest]])
-
-    def frames() -> Iterator[np.ndarray]:
-        return (cv2.transform(frame, mixed) for frame in open_frames())
-
-    return frames
+    mixed = mixture(weights, -255.0 * np.minimum(weights, 0.0).sum())
+    return lambda: map(mixed, open_frames())
 
 
 def _weights(open_frames: OpenFrames, count: int) -> Float[np.ndarray, "3"] | None:

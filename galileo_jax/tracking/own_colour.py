@@ -8,13 +8,14 @@ plain object is known by its edges alone, and where two touch, each has an edge 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.tracking.fragments import Start
-from galileo_jax.tracking.picture import OpenFrames
+from galileo_jax.tracking.picture import OpenFrames, mixture
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.template import RIM_SHARE, WINDOW_PX, Outline, grey, is_plain, template_at
 
@@ -32,57 +33,62 @@ def in_own_colours(open_frames: OpenFrames, starts: Sequence[Start]) -> list[Sta
         return list(starts)
     frames = zip(range(max(firsts) + 1), open_frames(), strict=False)
     kept = {index: frame for index, frame in frames if index in firsts}
-    colours = [_colours(kept.get(start.first_frame), start) for start in starts]
-    known = [one for one in colours if one is not None]
+    marked = [_marked(kept.get(start.first_frame), start) for start in starts]
+    known = [one for one in marked if one is not None]
     if len(known) < len(starts):
         return list(starts)
     return [
-        _in_own_colour(kept[start.first_frame], start, k, known) for k, start in enumerate(starts)
+        _in_own_colour(start, own, [other.colour for other in known if other is not own])
+        for start, own in zip(starts, known, strict=True)
     ]
 
 
-def _colours(frame: np.ndarray | None, start: Start) -> Float[np.ndarray, "pixel 3"] | None:
-    """Of the middle of an object, less the scene's; None: nothing is known, or all is grey."""
+class _Marked(NamedTuple):
+    """An object where it is first seen; colours are (blue, green, red), levels."""
+
+    frame: np.ndarray
+    scene: Float[np.ndarray, "3"]  # the frame's usual colour
+    middle: Float[np.ndarray, "pixel 3"]  # the object's, less the scene's
+
+    @property
+    def colour(self) -> Float[np.ndarray, "3"]:
+        """That of its middle, less the scene's."""
+        return np.median(self.middle, axis=0)
+
+
+def _marked(frame: np.ndarray | None, start: Start) -> _Marked | None:
+    """An object's colours; None: it is not in the picture, or all is grey."""
     if frame is None or frame.ndim < 3:
         return None
     x, y = (round(one) for one in start.point_px)
     low = max(y - HALF_PX, 0), max(x - HALF_PX, 0)
     middle = frame[low[0] : y + HALF_PX + 1, low[1] : x + HALF_PX + 1].reshape(-1, 3)
-    return middle - _scene(frame) if len(middle) else None
+    scene = np.median(frame[::4, ::4].reshape(-1, 3), axis=0)
+    return _Marked(frame, scene, middle - scene) if len(middle) else None
 
 
-def _scene(frame: np.ndarray) -> Float[np.ndarray, "3"]:
-    return np.median(frame[::4, ::4].reshape(-1, 3), axis=0)
+def _in_own_colour(start: Start, own: _Marked, others: Sequence[Float[np.ndarray, "3"]]) -> Start:
+    """An object with its view, and its size by that; as it is where it has texture.
 
-
-def _in_own_colour(
-    frame: np.ndarray, start: Start, k: int, colours: Sequence[Float[np.ndarray, "pixel 3"]]
-) -> Start:
-    """Object k with its view, and its size by that; as it is where it has texture."""
+    `others`: the colours of the others, less the scene's.
+    """
     width, height = start.outline.size_px or (WINDOW_PX, WINDOW_PX)
     middle = replace(start.outline, size_px=(width / 2, height / 2))
-    if not is_plain(template_at(grey(frame), np.array(start.point_px), middle)):
+    if not is_plain(template_at(grey(own.frame), np.array(start.point_px), middle)):
         return start
-    weights = np.median(colours[k], axis=0)
-    others = [np.median(one, axis=0) for i, one in enumerate(colours) if i != k]
+    weights = own.colour
     for other in others:
         if (size := float(np.linalg.norm(other))) > LEAST:
             weights = weights - (weights @ other) * other / size**2
     size = float(np.linalg.norm(weights))
-    if size < LEAST or (colours[k] @ weights / size).std() > EVEN * size:
+    if size < LEAST or (own.middle @ weights / size).std() > EVEN * size:
         return start
-    share = min(1.0, MOST / size)
-    mixed = share * weights / size
-    row = np.array([[*mixed, SCENE - mixed @ _scene(frame)]])
-
-    def view(frame: np.ndarray) -> np.ndarray:
-        return cv2.transform(frame, row)
-
-    outline = start.outline
+    mixed = min(1.0, MOST / size) * weights / size
+    outline, offset = start.outline, SCENE - float(mixed @ own.scene)
     if outline.size_px is None:
-        off = np.linalg.norm(frame - _scene(frame) - np.median(colours[k], axis=0), axis=2)
+        off = np.linalg.norm(own.frame - own.scene - own.colour, axis=2)
         outline = _seen(off < size / 2, start.point_px, outline)
-    return replace(start, view=view, outline=outline)
+    return replace(start, view=mixture(mixed, offset), outline=outline)
 
 
 def _seen(mask: np.ndarray, point_px: tuple[float, float], outline: Outline) -> Outline:

@@ -23,6 +23,12 @@ View = Callable[[np.ndarray], np.ndarray]
 """Makes one colour, `[height, width]` uint8, of a frame."""
 
 
+def mixture(weights: np.ndarray, offset: float) -> View:
+    """The view offset + weights' (blue, green, red), levels."""
+    row = np.array([[*weights, offset]])
+    return lambda frame: cv2.transform(frame, row)
+
+
 def some_frames(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
     """By their numbers `SOME_FRAMES` of the `count` frames of a film, the first among them."""
     chosen = set(np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist())
