@@ -9,15 +9,19 @@ from galileo_jax.assembly.expected import expected
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sizes import extents, rolling
-from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.effect import PENDULUM, SPRING, Surroundings
+from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
+from galileo_jax.model.effects.laws.spring import PERIOD
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 from galileo_jax.model.effects.laws.walls import StraightWalls
-from galileo_jax.model.scene.scene import Scene, laid_out, on_ramp
+from galileo_jax.model.model import SUBSTEPS
+from galileo_jax.model.scene.scene import TIMESTEP_S, Scene, laid_out, on_ramp
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
 EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt; of a way that turns back
 FEWEST = 3  # places that tell when it was let go
+STEPS_A_SWING = 150
 TURNED = 0.99  # of its way, where what ended nearer has turned back
 
 
@@ -58,7 +62,23 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         walls_m=tuple(wall.ends_m for wall in clip.walls),
         way_m=float(np.hypot(*np.ptp(observation.position_m[0, :2, observation.mask[0]], axis=0))),
     )
-    return Scene(surroundings, clip.objects)
+    return Scene(surroundings, clip.objects, _timestep_s(surroundings))
+
+
+def _timestep_s(scene: Surroundings) -> float:
+    """MuJoCo's own step, s; of what swings slowly two to four times as long.
+
+    `STEPS_A_SWING` recorded steps are off by 1e-10 of the amplitude a swing.
+    """
+    swing_s = 0.0
+    if SPRING in scene.laws:
+        swing_s, _ = scene.expected[PERIOD]
+    elif PENDULUM in scene.laws:
+        (length_m, _), (angle, _) = scene.expected[LENGTH], scene.expected[ANGLE]
+        # The wider it swings the longer it hesitates at its top, and the more an error grows there.
+        swing_s = 2 * math.pi * math.sqrt(length_m / scene.gravity) * abs(math.cos(angle / 2))
+    longest_s = swing_s / (STEPS_A_SWING * SUBSTEPS)
+    return TIMESTEP_S * max((n for n in (2, 3, 4) if n * TIMESTEP_S <= longest_s), default=1)
 
 
 def _starts(

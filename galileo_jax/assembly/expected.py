@@ -19,6 +19,7 @@ from galileo_jax.clip.sizes import volume_m3
 from galileo_jax.model.effects.air import expected_added_mass, expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
+from galileo_jax.model.effects.laws.spring import PERIOD
 from galileo_jax.model.effects.laws.start_velocity import LAUNCH, StartVelocity
 from galileo_jax.model.effects.nuisances.declared import DeclaredAngle, DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
@@ -82,7 +83,7 @@ def expected(
         **({"start_velocity_z": start(velocity[2])} if len(velocity) == 3 else {}),
         "start_speed": start(-velocity[1]),
         "rest": (middle, max(width, 0.01)) if known else (0.0, UNKNOWN_M),
-        "period": (period_s(times_s, down_m), PERIOD_SD),
+        PERIOD: (period_s(times_s, down_m), PERIOD_SD),
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
         **declared,

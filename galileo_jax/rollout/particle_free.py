@@ -1,9 +1,10 @@
 """One body that slides on nothing: a fall, a flight, a swing on a spring, a body in a liquid.
 
-Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order. On a
-straight path the forces act along it; in the plane gravity is a vector, the effects' forces act
-along the velocity, and the path is how far the body has come along its curve. What swings on a
-spring may rub on its track: k m g against its slip, which holds it where it turns back, if it can.
+Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order; on a
+spring, whose slow swings take longer steps, it is of fifth. On a straight path the forces act along
+it; in the plane gravity is a vector, the effects' forces act along the velocity, and the path is
+how far the body has come along its curve. What swings on a spring may rub on its track: k m g
+against its slip, which holds it where it turns back, if it can.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,8 +14,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
+from galileo_jax.model.effects.effect import SPRING, Bounce, Effect, Surroundings
 from galileo_jax.rollout.events import (
+    CLASSICAL,
+    DORMAND_PRINCE,
     PLASTIC_M_S,
     Rubbing,
     System,
@@ -54,6 +57,7 @@ class FreeSystem(System):
                 stopped=lambda at: at._replace(velocity_m_s=jnp.zeros_like(at.velocity_m_s)),
                 moved=self._slipped,
             )
+        self.method = DORMAND_PRINCE if SPRING in scene.laws else CLASSICAL
         is_smooth = self.floor is None and self.rubbing is None
         self.most_events = 1 if is_smooth else MAX_BOUNCES
         velocity = start_velocity(task.effects, task.named, scene)
@@ -96,13 +100,21 @@ class FreeSystem(System):
     def _moved(self, body: Body, time_s: Any, spent_s: jax.Array, rests: Any) -> Body:
         """The body after a time without a bounce."""
         return runge_kutta(
-            lambda at, t: rates(at, t, self.law, self.scene, rests), body, time_s, spent_s
+            lambda at, t: rates(at, t, self.law, self.scene, rests),
+            body,
+            time_s,
+            spent_s,
+            self.method,
         )
 
     def _slipped(self, body: Body, time_s: Any, spent_s: jax.Array, way: Any) -> Body:
         """The body after a time in which it does not turn back."""
         return runge_kutta(
-            lambda at, t: slip_rates(at, t, self.law, self.scene, way)[0], body, time_s, spent_s
+            lambda at, t: slip_rates(at, t, self.law, self.scene, way)[0],
+            body,
+            time_s,
+            spent_s,
+            self.method,
         )
 
     def _acceleration(self, at: Body, time_s: Any, way: Any) -> tuple[Any, Any]:

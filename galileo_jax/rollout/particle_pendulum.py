@@ -1,10 +1,10 @@
 """A bob on a thread or a rod, on a circle, at any angle.
 
-The angle's equation is integrated by Runge-Kutta steps of fifth order and 1/240 s (error below
-1e-11 of the amplitude over 10 s of a thread of 1 m, 3e-7 of one of 5 cm). Dry friction in the
-bearing holds the bob where it turns back, if it can; these instants are met at their time. A thread
-that gives way follows its load at once, since it vibrates much faster than the bob swings (first
-order in the stretch s):
+The angle's equation is integrated by Runge-Kutta steps of fifth order and 1/240 s or, of a slow
+swing, 1/150 of its period at most (error below 1e-9 of the amplitude over 10 s, 3e-7 of a thread of
+5 cm). Dry friction in the bearing holds the bob where it turns back, if it can; these instants are
+met at their time. A thread that gives way follows its load at once, since it vibrates much faster
+than the bob swings (first order in the stretch s):
 
     r = L + s (cos a + L w^2 / g)
     L a'' (1 + i + 2 (s / L) (cos a + 3 L w^2 / g)) = -g sin a (1 + (s / L) (cos a - L w^2 / g)) + f

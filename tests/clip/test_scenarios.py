@@ -143,14 +143,16 @@ def test_a_launcher_is_faster_than_the_first_frame(tmp_path):
     assert prior.sd == pytest.approx(math.radians(0.5))
 
 
-def test_a_spring_swings_with_its_period(tmp_path):
-    period, damping, rest, speed = 0.7, 0.3, 0.05, 0.2
+@pytest.mark.parametrize(("period", "records_a_second"), [(0.7, 240), (1.3, 120)])
+def test_a_spring_swings_with_its_period(period, records_a_second, tmp_path):
+    damping, rest, speed = 0.3, 0.05, 0.2
     w = 2 * math.pi / period
     f = math.sqrt(w**2 - damping**2)
     q = rest + np.exp(-damping * TIMES_S) * (
         -rest * np.cos(f * TIMES_S) + (speed - damping * rest) * np.sin(f * TIMES_S) / f
     )
     problem = problem_of(write(tmp_path, "spring", -q))
+    assert problem.model.record_dt_s == pytest.approx(1 / records_a_second)
     given = {"period": period, "damping": damping, "rest": rest, "start_speed": speed}
     theta = theta_of(problem, **given)
     assert problem.simulate(theta)[0, 1] == pytest.approx(-q, abs=SMOOTH_M)

@@ -2,6 +2,7 @@
 
 from galileo_jax.model.effects.effect import (
     PENDULUM,
+    SPRING,
     Array,
     Bounce,
     Effect,

@@ -67,6 +67,7 @@ class Walls(NamedTuple):
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
 FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
 PENDULUM = "pendulum"  # the law under which the path is a circle
+SPRING = "spring"  # the law of what swings along a line
 SPIN = "spin"  # its components by axis, "spin_x" and so on, where the spin is known
 
 Force = Callable[[State], PerObject]

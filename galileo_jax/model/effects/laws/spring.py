@@ -13,29 +13,31 @@ Source: Hooke, De potentia restitutiva (1678); Taylor, Classical Mechanics (2005
 
 import math
 
-from galileo_jax.model.effects import Effect, LogNormal, Normal, Parameter
+from galileo_jax.model.effects import SPRING, Effect, LogNormal, Normal, Parameter
+
+PERIOD = "period"
 
 
-class Spring(Effect, where=lambda scene: "spring" in scene.laws):
-    name = "spring"
+class Spring(Effect, where=lambda scene: SPRING in scene.laws):
+    name = SPRING
 
     def parameters(self, scene):
-        period, rest = LogNormal(*scene.expected["period"]), Normal(*scene.expected["rest"])
+        period, rest = LogNormal(*scene.expected[PERIOD]), Normal(*scene.expected["rest"])
         return (
-            Parameter("period", "s", period, period.median, "main", 0.02),
+            Parameter(PERIOD, "s", period, period.median, "main", 0.02),
             Parameter("damping", "1/s", LogNormal(0.1, 1.5), 0.0, "main", 0.1),
             Parameter("rest", "m", rest, 0.0, "main", 0.02, per_clip=True),
         )
 
     def force(self, theta, scene):
         mass = theta["m1"][..., None]
-        stiffness = mass * (2 * math.pi / theta["period"][..., None]) ** 2
+        stiffness = mass * (2 * math.pi / theta[PERIOD][..., None]) ** 2
         rubbing = 2 * mass * theta["damping"][..., None]
         rest, weight = theta["rest"][..., None], (theta["m1"] * scene.gravity)[..., None]
         return lambda state: -stiffness * (state.path_m - rest) - rubbing * state.speed_m_s - weight
 
     def derived(self, theta, scene):
-        square = (2 * math.pi / theta["period"]) ** 2
+        square = (2 * math.pi / theta[PERIOD]) ** 2
         return {
             "stiffness": (theta["m1"] * square, "N/m"),
             "stretch": (scene.gravity / square, "m"),

@@ -10,11 +10,11 @@ force, Am. J. Phys. 72, 477.
 Confused with: damping and viscous_drag in a clip of a few swings of nearly the same size.
 """
 
-from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
+from galileo_jax.model.effects import SPRING, Effect, LogNormal, Parameter, register
 
 
 @register
-class DryFriction(Effect, where=lambda scene: "spring" in scene.laws):
+class DryFriction(Effect, where=lambda scene: SPRING in scene.laws):
     name = "dry_friction"
     unknowns = (Parameter("dry_friction", "1", LogNormal(0.005, 1.0), 0.0, "effect", 0.1),)
 
