@@ -110,7 +110,7 @@ def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely
     if table.axes == ("angle",):
         return Likely("pendulum", "an angle in time", is_clear=True)
     if len(place) == 1:
-        return _along_a_line(seconds, place[0], metres_per_unit)
+        return _along_a_line(seconds, place[0], metres_per_unit, table.axes == ("y",))
     found = likely_in_plane(place[0], place[1])
     if found.scenario == "level":  # a table's x may lie along a slope, as a picture's does not
         return replace(found, scenario="incline")
@@ -122,8 +122,10 @@ def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely
     return replace(found, is_clear=False, why=f"{found.why}, {size:.3g} m/s^2")
 
 
-def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
-    """The likeliest scenario of one coordinate in time."""
+def _along_a_line(
+    seconds: np.ndarray, way: np.ndarray, metres_per_unit: float, is_height: bool
+) -> Likely:
+    """The likeliest scenario of one coordinate in time; `is_height`: its title says so."""
     if _bounces(way):
         return Likely("fall", "one coordinate, which is thrown back", bounces=True)
     if (turns := len(_turning(way))) >= SWINGS:
@@ -134,7 +136,11 @@ def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) 
         why = f"one coordinate, {short(round(abs(size), 2))} m/s^2"
         return Likely("fall", why, is_clear=True)
     told = f", {abs(size):.3g} m/s^2" if math.isfinite(size) else ""
-    return Likely("incline", f"one coordinate{told}")
+    return (
+        Likely("fall", f"a height{told}")
+        if is_height
+        else Likely("incline", f"one coordinate{told}")
+    )
 
 
 def _without_strays(values: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def split_heading(rows: Rows) -> Heading:
     usual = statistics.median(sum(map(bool, row)) for row in later)  # filled cells
     start = next(
         (n for n, (_, row) in enumerate(rows)
-         if _is_body(row, words) and 2 * sum(map(bool, row)) > usual
+         if _is_body(row, words) and 2 * sum(map(bool, row)) > usual and not COMMENT.match(row[0])
          and not _first_titles_below(rows, n)), None)  # fmt: skip
     if start is None:
         raise InputError(

@@ -54,6 +54,7 @@ CUT_IN_A_TIME = b"Z;0.2;0.3\n" + b"".join(
 @settings(max_examples=300)
 @given(content=damaged())
 @example(content=CUT_IN_A_TIME)
+@example(content=b'!{"t": [0.0, 0.04, 0.08], "x": [0.0, 0.08, 0.16]}')
 @example(content="\n".join(f"{n * 0.04:.2f}" for n in range(20)).encode())
 def test_damaged_tables(content: bytes, tmp_path_factory) -> None:
     reads_or_says(tmp_path_factory.getbasetemp() / "damaged.csv", content)
