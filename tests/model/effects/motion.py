@@ -49,6 +49,7 @@ OFF_THE_RAMP = (
         "bearing_friction",
         "dry_friction",
         "rod_mass",
+        "spring_stiffening",
         "thread_stretch",
     ),
     *("oval_rim", "uneven_pressure"),
