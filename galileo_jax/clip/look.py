@@ -8,7 +8,9 @@ import numpy as np
 
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.clip.track_csv import MIN_ROWS
 from galileo_jax.numerics.least_squares import line_through, polynomial, two_lines
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import usual_step
 from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 
@@ -31,6 +33,7 @@ MIN_NEIGHBOURS, STRAY, MANY = 8, 0.05, 10.0
 the way, and by so many times as much as the others."""
 
 FALL_M_S2 = (7.0, 12.0)  # what a fall accelerates with, air and a camera that is not level in it
+JITTERS, ROWS_OF_A_STEP = 0.6, 8
 GAP = 1.5  # of the usual step
 
 
@@ -54,6 +57,9 @@ class Likely:
         return self.is_clear and self.scenario == "flight"
 
 
+AT_REST = Likely("incline", "nothing moves but by the errors of its places")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Seen(Likely):
     """What was understood of a table, and of object 1 in it."""
@@ -73,7 +79,11 @@ class Seen(Likely):
 
 
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
-    """What a table shows; `fps` makes its frames seconds."""
+    """What a table shows; `fps` makes its frames seconds.
+
+    Raises:
+      InputError: too few rows show a place.
+    """
     warnings = table.warnings
     if (count := len(table.starts)) > 1:
         warnings += (f"{path}: {count} motions, of which the first is looked at",)
@@ -81,6 +91,8 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
     steps, step = np.diff(table.clock), usual_step(table.clock)
     place = table.position[0]
     shown = np.isfinite(place).all(axis=0)
+    if (num := int(shown.sum())) < MIN_ROWS:
+        raise InputError(f"{path}: {num} rows show a place; at least {MIN_ROWS} expected")
     likely = _likely(table, table.seconds(fps)[shown], place[:, shown])
     return Seen(
         **vars(likely),
@@ -105,10 +117,10 @@ def _likely(table: TrackTable, seconds: np.ndarray, place: np.ndarray) -> Likely
     if len(table.names) > 1:
         why = f"{len(table.names)} objects; a ramp, if one slides down into others"
         return Likely("from_above", why)
-    if place.shape[1] < 2:
-        return Likely("fall", "too few rows to tell")
     if table.axes == ("angle",):
         return Likely("pendulum", "an angle in time", is_clear=True)
+    if _jitters(place):
+        return AT_REST
     if len(place) == 1:
         return _along_a_line(seconds, place[0], metres_per_unit, table.axes == ("y",))
     found = likely_in_plane(place[0], place[1])
@@ -155,6 +167,8 @@ def _without_strays(values: np.ndarray) -> np.ndarray:
 
 def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     """The likeliest scenario of one object's path in a plane, in any unit and without a clock."""
+    if _jitters(np.stack([x, y])):
+        return AT_REST
     x, y = _without_strays(x), _without_strays(y)
     along = x if np.ptp(x) >= np.ptp(y) else y
     turns = len(_turning(along))
@@ -222,6 +236,20 @@ def _turning(values: np.ndarray, share: float = 0.1) -> list[int]:
             turns.append(last)
             direction, last = -direction, i
     return turns
+
+
+def _jitters(place: np.ndarray) -> bool:
+    """Whether places `[axis, row]` are errors about one place, each for itself.
+
+    Von Neumann's ratio, the mean square of the steps over the variance, is 2 of such, over however
+    many rows a step is. What swings comes back in some of them.
+    """
+    if place.shape[1] < 3 * ROWS_OF_A_STEP:
+        return False
+    spread = np.var(place, axis=1)
+    apart = [place[:, n:] - place[:, :-n] for n in range(1, ROWS_OF_A_STEP + 1)]
+    least = np.min([np.mean(one**2, axis=1) for one in apart], axis=0)
+    return bool((least > JITTERS * spread)[spread > 0].all())
 
 
 def _bounces(along: np.ndarray) -> bool:

@@ -16,6 +16,7 @@ from galileo_jax.diagnosis.stakes import (
     odds_of,
     without_surplus,
 )
+from galileo_jax.diagnosis.thresholds import INCREDIBLE_SDS
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -50,7 +51,16 @@ def candidate_of(table: Table, entry: Entry) -> Candidate:
         log_prior=table.stakes.log_prior(hypothesis),
         num_constants=num_constants(trials, hypothesis),
         num_expected=num_expected(odds_of(trials, hypothesis)),
+        unusual=incredible(trials, hypothesis),
     )
+
+
+def incredible(trials: JointProblem, hypothesis: Hypothesis) -> tuple[str, ...]:
+    """The effects' parameters whose values nobody would believe, whatever the data say."""
+    fit = hypothesis.fit
+    is_far = fit.free & (np.abs(fit.z) > INCREDIBLE_SDS)
+    chosen = [trials.parameters[i] for i in np.flatnonzero(is_far)]
+    return tuple(one.name for one in chosen if one.role == "effect")
 
 
 def law_candidates(

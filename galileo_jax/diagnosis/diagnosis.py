@@ -50,7 +50,8 @@ class Candidate:
     num_constants: int = 1  # parameters of its effects
     # how many of its effects the clip leads to expect, as the drag of the air
     num_expected: int = 0
-    # names of imperfections that are larger beside it than such things usually are
+    # names of imperfections beside it, and of its own parameters, that are larger than such things
+    # usually are
     unusual: tuple[str, ...] = ()
 
     @property

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, compare
-from galileo_jax.diagnosis.candidates import error_left
+from galileo_jax.diagnosis.candidates import error_left, incredible
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.friction_along_way import Stretch, friction_along_way
 from galileo_jax.diagnosis.judge import Judge
@@ -158,5 +158,5 @@ def _sized(trials: JointProblem, base: Hypothesis, candidate: Candidate) -> Cand
         log_evidence=fit.log_evidence - base.fit.log_evidence,
         p_value=None,
         confounded_with=(),
-        unusual=tuple(fit.sizes.unusual),
+        unusual=(*fit.sizes.unusual, *incredible(world.trials, hypothesis)),
     )

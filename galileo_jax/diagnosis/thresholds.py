@@ -49,6 +49,9 @@ LENGTH_ODDS = 0.1
 # An effect of so many constants (how strong, where, how wide) can imitate many motions.
 MANY_CONSTANTS = 3
 
+# Standard deviations of its prior from its middle, where nobody's ramp, table or clock is: what is
+# wrong is the scene that was declared.
+INCREDIBLE_SDS = 6.0
 # Standard deviations below zero at which friction would push beyond doubt: that is no friction.
 PUSHES_SD = 3.0
 # The p-value from which on what clips that do not fit together lack is called alike.

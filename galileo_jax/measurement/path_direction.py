@@ -149,12 +149,24 @@ def way_text(clip: Clip, way: OtherWay) -> str:
 
 
 def path_doubt(clip: Clip, observation: Observation) -> str | None:
-    """One line where what should hang on a thread, or fall, goes straight elsewhere; else None."""
+    """One line where an object goes straight on where its scenario does not; else None."""
     seen, name = observation.mask[0], observation.names[0]
-    if clip.scenario not in ("pendulum", "fall") or not seen.any():
+    if clip.scenario not in ("pendulum", "fall", "ramp") or not seen.any():
         return None
     place = observation.position_m[0, :2][:, seen]
+    if clip.scenario == "ramp":
+        place = place[:, place[0] > 0]
+        if place.shape[1] < MIN_POINTS:
+            return None
     likely = likely_in_plane(*place)
+    if clip.scenario == "ramp":
+        slope_deg = likely.slope_deg or 0.0
+        if likely.scenario != "incline" or slope_deg < TURNED_DEG:
+            return None
+        return (
+            f"{clip.path}: {name} goes straight down by {slope_deg:.1f} degrees where the table is "
+            "level (perhaps scenario: incline, or the origin is not the foot of the ramp)"
+        )
     if clip.scenario == "fall":
         if likely.is_throw:
             return (

@@ -13,6 +13,7 @@ from galileo_jax.clip.schema import ClipFile
 from galileo_jax.runtime.errors import InputError
 
 T = np.arange(30) / 25
+NOISE = np.random.default_rng(1).normal(0.3, 2e-3, (2, 30))
 
 
 def write(path: Path, titles: str, *columns: np.ndarray) -> Path:
@@ -34,6 +35,27 @@ def test_the_likely_scenario(titles, columns, scenario, tmp_path: Path) -> None:
     said = yaml.safe_load(found.yaml)
     assert said["scenario"] == scenario and said["track"] == "a.csv"
     assert set(said) <= set(ClipFile.model_fields)
+
+
+@pytest.mark.parametrize("titles, columns, why", [
+    ("t (s);Höhe (m)", (T, 3 - 3 * np.log(np.cosh(1.4 * T))), "fall: a height"),
+    ("t (s);x (m);y (m)", (T, *NOISE), "nothing moves"),
+])  # fmt: skip
+def test_why_it_may_be(titles, columns, why, tmp_path: Path) -> None:
+    seen = look(write(tmp_path / "a.csv", titles, *columns)).seen
+    assert seen is not None and not seen.is_clear
+    assert why in f"{seen.scenario}: {seen.why}"
+
+
+def test_a_swing_of_four_rows_moves() -> None:
+    angle = np.arange(30) * np.pi / 2 + 0.3
+    assert likely_in_plane(np.sin(angle), 0.1 * np.cos(angle)).swings > 3
+
+
+def test_too_few_places(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "t (s);x (m);y (m)", T, T, np.full(30, np.nan))
+    with pytest.raises(InputError, match="0 rows show a place; at least 4 expected"):
+        look(path)
 
 
 def test_summary_names_columns_gaps_and_what_is_not_known(tmp_path: Path, capsys) -> None:

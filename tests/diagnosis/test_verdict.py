@@ -4,12 +4,13 @@ Thresholds stand here as plain numbers, not imported: whoever changes one change
 """
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from galileo_jax.comparison.compare import Comparison
+from galileo_jax.diagnosis.candidates import incredible
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from galileo_jax.diagnosis.stakes import (
     VerdictStakes,
@@ -35,6 +36,8 @@ from galileo_jax.diagnosis.verdict import (
     without_a_name,
 )
 from galileo_jax.inference.fits.gradient import Code, GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects import Normal, Parameter
 from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 
@@ -84,6 +87,24 @@ def rules(found: Verdict) -> list[str]:
 
 
 UNKNOWN = ("unknown", (), None)
+
+
+class _Trials:
+    """What is asked of trials: their parameters."""
+
+    parameters = (
+        Parameter("k1", "1", Normal(0.0, 1.0), 0.0, "main", 0.1),
+        Parameter("table_tilt", "rad", Normal(0.0, 0.026), 0.0, "effect", 0.1),
+    )
+
+
+@pytest.mark.parametrize("z, is_believed", [(6 - EDGE, True), (6 + EDGE, False), (-7.0, False)])
+def test_what_nobody_would_believe_explains_nothing(z, is_believed):
+    one = candidate("table_tilt", 500.0)
+    fit = replace(one.hypothesis.fit, z=np.array([9.0, z]), free=np.ones(2, bool))
+    far = incredible(cast(JointProblem, _Trials()), replace(one.hypothesis, fit=fit))
+    assert far == (() if is_believed else ("table_tilt",))
+    assert explains(replace(one, unusual=far)) == is_believed
 
 
 # The table of all hypotheses.

@@ -222,3 +222,10 @@ def test_a_circle_seen_from_above_is_no_pendulum(share: float, is_said: bool, tm
     )
     said = measure(load_clip(tmp_path / "a.yaml")).impossible
     assert ("round and round" in (said or "")) == is_said
+
+
+def test_a_slope_all_the_way_is_no_ramp_with_a_table(tmp_path):
+    path = write(tmp_path, 20.0, "ramp\nramp_angle_deg: 20", 1.0)
+    (said,) = (line for line in measure(load_clip(path)).warnings if "table is level" in line)
+    assert "goes straight down by 20.0 degrees" in said
+    assert "perhaps scenario: incline" in said
