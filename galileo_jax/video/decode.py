@@ -157,7 +157,7 @@ class _Scan:
     missing: int  # pictures that it announces and that are not there
     # from each picture that is looked at to the first of them, px, where the camera moves
     camera: steady.Homographies | None = None
-    # pictures that are looked at in which it moves, and where what stands still is not found
+    # pictures in which it has moved, and where it looks then nothing tells that stands still
     camera_lost: tuple[int, ...] = ()
 
     @property
@@ -173,7 +173,9 @@ class _Scan:
     @property
     def used(self) -> np.ndarray:
         """`[picture]`: which are looked at."""
-        return ~(is_blank(self.contrast) | repeats(self.change))
+        found = ~(is_blank(self.contrast) | repeats(self.change))
+        found[list(self.camera_lost)] = False
+        return found
 
     def warnings(self) -> Iterator[str]:
         """What is said of the film, and of pictures that are not looked at."""
@@ -207,9 +209,8 @@ class _Scan:
             )
         if self.camera_lost:
             yield (
-                "the camera moves, and in picture "
-                f"{listed(np.array(self.camera_lost))} too little stands still to tell how: taken "
-                "as if it rested; film with a camera that does"
+                f"in picture {listed(np.array(self.camera_lost))} the camera has moved, and too "
+                f"little stands still to tell how: left out{counted}"
             )
         if self.missing:
             yield f"{total} of {total + self.missing} announced frames can be decoded"
@@ -293,16 +294,17 @@ def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
 
 
 def _with_camera(path: Path, scan: _Scan) -> _Scan:
-    """With how the camera moves, or where that is not told."""
+    """With how the camera moves, and where that is not told."""
     smaller = (
         steady.small(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)) for picture in _pictures(path, scan)
     )
     found = list(steady.to_first(smaller))
     known = [one for one in found if one is not None]
-    if len(known) < len(found):
-        return replace(scan, camera_lost=tuple(i for i, one in enumerate(found) if one is None))
+    looked_at = np.flatnonzero(scan.used)
+    lost = [int(n) for n, one in zip(looked_at, found, strict=True) if one is None]
     factor = scan.size_px[0] / min(scan.size_px[0], steady.WIDEST_PX)
-    return replace(scan, camera=steady.enlarged(np.stack(known), factor))
+    camera = steady.enlarged(np.stack(known), factor)
+    return replace(scan, camera=camera, camera_lost=tuple(lost))
 
 
 def _pictures(path: Path, scan: _Scan) -> Iterator[np.ndarray]:
