@@ -338,8 +338,8 @@ def explained(
     sources = [one.clip.source for one in first.measurements]
     command = command_line("explain", sources, engine=engine, seed=seed or None)
     found = Explanation(first, check, None, command)
-    if check.found.no_verdict is not None:
-        return found
+    if check.found.no_verdict is not None or "impossible" in first.result:
+        return found  # what would be missing is no result either
     with progress.part(COMPARED, 0.95):
         if check.is_adequate and not (check.in_question or check.rests_on_imperfections):
             return replace(found, gravity=_gravity(first, engine, seed))

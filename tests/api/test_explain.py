@@ -105,6 +105,19 @@ def test_a_clip_that_cannot_tell_is_not_diagnosed(board, plain, monkeypatch):
     assert gx.explain(board).diagnosis is None
 
 
+def test_what_has_to_be_checked_first_is_not_diagnosed(tmp_path, monkeypatch):
+    """A throw that is said to fall."""
+    monkeypatch.setattr(module, "diagnose_fitted", None)
+    t = np.arange(25) / 30
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((2, 25))
+    x, y = np.stack([2.0 * t, 3.4 * t - 4.905 * t**2]) + noise
+    rows = "\n".join(f"{a:.4f},{b:.4f},{c:.4f}" for a, b, c in zip(t, x, y, strict=True))
+    (tmp_path / "a.csv").write_text(f"t (s),x (m),y (m)\n{rows}\n")
+    found = gx.explain(tmp_path / "a.csv", scenario="fall")
+    assert found.diagnosis is None
+    assert found.paragraph.startswith("Check first: object1 goes along a path that bends")
+
+
 def test_a_folder_is_trials_of_the_same_objects(tmp_path):
     for n in (1, 2):
         path = tmp_path / "trials" / f"{n}.csv"
