@@ -56,6 +56,7 @@ PROBLEMS = {
         "{found} is not a mapping; {keys} expected",
     ),
     "string_type": "{found} is not text",
+    **dict.fromkeys(("bool_type", "bool_parsing"), "{found} is not true or false"),
     **dict.fromkeys(("int_type", "int_from_float"), "{found} is not a whole number"),
     "greater_than_equal": "{found} is negative; 0 or more expected",
     "finite_number": "{found} is not finite; a number expected",

@@ -286,6 +286,9 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "unknown_shape": _edit("shape: box", "shape: cube", "shape", "cube", "box, cylinder"),
     "box_that_rolls": _of_object("rolls: true", "a box slides"),
     "rolls_too_much": _of_object("rolls: 1.5", "1.5", "hollow ball"),
+    "moving_perhaps": _edit(
+        "gravity: 9.81", "starts_moving: perhaps", "starts_moving", "'perhaps' is not true or false"
+    ),
     "unknown_direction": _edit("direction: right", "direction: up", "direction", "up", "left"),
     "fps_is_zero": _edit("fps: 30.0", "fps: 0", "fps", "0", "above 0"),
     "fps_is_negative": _edit("fps: 30.0", "fps: -30.0", "fps", "-30"),
