@@ -19,7 +19,7 @@ import numpy as np
 
 from galileo_jax.measurement.segments.blow import SMEARED, continues
 from galileo_jax.measurement.segments.rest import is_one_place
-from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
@@ -152,7 +152,7 @@ def comes_free(observation: Observation, last: int) -> bool:
     parts = path[max(at - FREE_FRAMES, 0) : at], path[at + SMEARED : at + SMEARED + FREE_FRAMES]
     if min(map(len, parts)) < FEWEST:
         return False
-    fits = [polynomial(part.times_s - part.times_s[0], part.place_m.T, 2) for part in parts]
+    fits = [part.polynomial(2, part.times_s[0]) for part in parts]
     held, free = (2 * fit.solution[0] for fit in fits)
     sds = [2 * float(np.sqrt(np.mean(fit.sds[0] ** 2))) for fit in fits]
     size, apart = float(np.linalg.norm(free)), float(np.linalg.norm(held - free))
