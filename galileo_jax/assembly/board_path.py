@@ -26,12 +26,10 @@ MEAN_SDS = 3.0  # by which the mean slope is another than the angle, that at the
 
 def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, float]]:
     """Means and widths of the priors of `BoardShape`; empty where the path is straight."""
-    seen = np.flatnonzero(observation.mask[0])
-    if len(seen) < FEWEST:
+    path = observation.path()
+    if len(path) < FEWEST:
         return {}
-    place = observation.position_m[0][:, seen]
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
-    gone, along = place - place[:, :1], line_through(place).along
+    gone, variance, along = path.gone_m, path.variance_m2, line_through(path.place_m).along
     down = np.array([along[1], -along[0]]) * math.copysign(1.0, along[0])
     way, drop = along @ gone, down @ gone
     length = float(way.max())
@@ -47,7 +45,7 @@ def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, 
         if terms == 0 and np.abs(left).max() < max(LEAST_BEND_M, LEAST_BEND_SHARE * length):
             return {}
         # Of the size of what is left: points wobble together.
-        cost = 0.5 * len(seen) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
+        cost = 0.5 * len(path) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
         if best is None or cost < best[0]:
             spread = np.mean(left**2 / variance) * np.linalg.inv(weighted.T @ weighted)
             best = cost, solution[1:], np.sqrt(np.diagonal(spread))[1:]

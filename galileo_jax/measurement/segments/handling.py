@@ -61,11 +61,8 @@ def hand_frame(observation: Observation, least_m_s2: float = 0.0) -> int | None:
 
 def goes_up(observation: Observation) -> bool:
     """Whether object 1 goes up its board first, against `Clip.direction`."""
-    place = observation.path().place_m
-    if not place.size:
-        return False
-    away = place - place[:, :1]
-    return bool(away[0, int(np.argmax(np.hypot(*away[:2])))] < 0)
+    path = observation.path()
+    return bool(len(path) and path.gone_m[0, path.farthest] < 0)
 
 
 def pushed_frame(observation: Observation, index: int = 0, least_m_s2: float = 0.0) -> int | None:
@@ -167,7 +164,7 @@ def _window(frames: int) -> int:
 
 def _begins(path: PointPath) -> tuple[int, float]:
     """The first place from which on it is clearly away from the first; and how far it comes, m."""
-    gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
+    gone = np.linalg.norm(path.gone_m, axis=0)
     way_m = float(gone.max(initial=0.0))
     return _leaves(path, gone, way_m), way_m
 
