@@ -119,7 +119,7 @@ def distance_at_hit(observation: Observation) -> tuple[int, int, float, float] |
 def _with_radii(clip: Clip, radii: list[float]) -> Clip:
     """The clip with radii of the pucks that have none."""
     objects = tuple(
-        item if item.size_m is not None else item.model_copy(update={"size_m": (radius, HEIGHT_M)})
+        item.model_copy(update={"size_m": item.size_m or (radius, HEIGHT_M)})
         for item, radius in zip(clip.objects, radii, strict=True)
     )
     return clip.model_copy(update={"objects": objects})
