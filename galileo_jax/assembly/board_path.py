@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.effects.nuisances.board_shape import LENGTH, MOST, BoardShape
-from galileo_jax.numerics.least_squares import line_through
+from galileo_jax.numerics.least_squares import least_squares, line_through
 from galileo_jax.observation.observation import Observation
 
 LEAST_BEND_M, LEAST_BEND_SHARE = 0.0015, 0.004
@@ -35,20 +35,19 @@ def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, 
     length = float(way.max())
     if length <= 0:
         return {}
-    u = 2 * way / length - 1
+    u, sd = 2 * way / length - 1, np.sqrt(variance)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     for terms in range(MOST + 1):
         design = _design(u, terms)
-        weighted = design / np.sqrt(variance)[:, None]
-        solution, *_ = np.linalg.lstsq(weighted, drop / np.sqrt(variance), rcond=None)
-        left = drop - design @ solution
+        fit = least_squares(design / sd[:, None], drop / sd)
+        left = drop - design @ fit.solution
         if terms == 0 and np.abs(left).max() < max(LEAST_BEND_M, LEAST_BEND_SHARE * length):
             return {}
         # Of the size of what is left: points wobble together.
         cost = 0.5 * len(path) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
         if best is None or cost < best[0]:
-            spread = np.mean(left**2 / variance) * np.linalg.inv(weighted.T @ weighted)
-            best = cost, solution[1:], np.sqrt(np.diagonal(spread))[1:]
+            spread = np.mean(left**2 / variance) * fit.inverse
+            best = cost, fit.solution[1:], np.sqrt(np.diagonal(spread))[1:]
     assert best is not None
     _, found, error = best
     if len(found) < 2:

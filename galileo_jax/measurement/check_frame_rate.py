@@ -20,8 +20,8 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
-from galileo_jax.numerics.least_squares import circle, least_squares, polynomial
-from galileo_jax.numerics.periodogram import period_s
+from galileo_jax.numerics.least_squares import circle, polynomial
+from galileo_jax.numerics.periodogram import period_s, sine_through
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
@@ -198,8 +198,7 @@ def thread_doubt(clip: Clip, observation: Observation) -> str | None:
 def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:
     """From its period; None of less than a period, or of a swing that is no sine."""
     period = period_s(times, x)
-    turn = 2 * math.pi * times / period
-    fit = least_squares(np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1), x)
+    fit = sine_through(times, x, period)
     if np.ptp(times) < period or np.std(fit.left) > SINE * np.std(x):
         return None
     amplitude = min(float(np.hypot(*fit.solution[1:])) / thread_m, 1.0)
