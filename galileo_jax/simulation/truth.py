@@ -185,11 +185,10 @@ def draw_truth(
     Places across the travel (z2) are 0 where not given. `shapes`: of the objects, in the order of
     the travel; what is round rolls.
     """
-    truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
-    for _ in range(NUM_TRIES):
+    for _ in range(NUM_TRIES + 1):
+        truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
         if len(shapes) < 2 or truth.hit_speed_m_s > SLOWEST_HIT_M_S:
             break
-        truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
     return truth
 
 
