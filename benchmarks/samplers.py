@@ -141,7 +141,7 @@ def drawn_from_the_prior(seed: int, count: int, noise: NoiseModel) -> list[Case]
     """Truths from the priors, observed as the model says."""
     objects = tuple(ClipObject(name=f"object{i}", shape="box", size_m=SIZE_M) for i in (1, 2))
     angle = tracks.RAMP_ANGLE_DEG
-    setting = Truth((0.4, 0.4), (0.1, 0.1), angle, objects, RELEASE_M, OBJECT2_M)
+    setting = Truth((0.4, 0.4), (0.1, 0.1), angle, objects, RELEASE_M, (OBJECT2_M,))
     start = np.array(setting.surroundings.start_m)[..., None]
     seen = tracks.observed(np.tile(start, tracks.NUM_FRAMES), tracks.FPS, NOISE_M)
     clip = tracks.declared(objects, angle, tracks.FPS, tracks.NUM_FRAMES)

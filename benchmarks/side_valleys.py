@@ -91,7 +91,7 @@ def draw_scene(seed: int) -> Case:
         ramp_angle_deg=angle_deg,
         objects=objects,
         release_m=_log_uniform(rng, RELEASES_M),
-        object2_x_m=sum(lengths) + _log_uniform(rng, GAPS_M),
+        stand_x_m=(sum(lengths) + _log_uniform(rng, GAPS_M),),
     )
     if rng.random() < 0.5:
         truth = _with_faults(truth, rng)

@@ -95,7 +95,7 @@ def _solve_exactly(truth: Truth, times_s: np.ndarray):
         angle_rad=truth.angle_rad,
         size_m=tuple((2 * length, 2 * height) for length, height in sizes),  # pyright: ignore
         release_m=truth.release_m,
-        object2_x_m=truth.object2_x_m,
+        object2_x_m=truth.stand_x_m[0],
         gravity=truth.gravity,
     )
     return solve(experiment, times_s)

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.effects.nuisances.board_shape import LENGTH, MOST, BoardShape
-from galileo_jax.numerics.least_squares import line_through
+from galileo_jax.numerics.least_squares import least_squares, line_through
 from galileo_jax.observation.observation import Observation
 
 LEAST_BEND_M, LEAST_BEND_SHARE = 0.0015, 0.004
@@ -26,31 +26,28 @@ MEAN_SDS = 3.0  # by which the mean slope is another than the angle, that at the
 
 def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, float]]:
     """Means and widths of the priors of `BoardShape`; empty where the path is straight."""
-    seen = np.flatnonzero(observation.mask[0])
-    if len(seen) < FEWEST:
+    path = observation.path()
+    if len(path) < FEWEST:
         return {}
-    place = observation.position_m[0][:, seen]
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
-    gone, along = place - place[:, :1], line_through(place).along
+    gone, variance, along = path.gone_m, path.variance_m2, line_through(path.place_m).along
     down = np.array([along[1], -along[0]]) * math.copysign(1.0, along[0])
     way, drop = along @ gone, down @ gone
     length = float(way.max())
     if length <= 0:
         return {}
-    u = 2 * way / length - 1
+    u, sd = 2 * way / length - 1, np.sqrt(variance)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     for terms in range(MOST + 1):
         design = _design(u, terms)
-        weighted = design / np.sqrt(variance)[:, None]
-        solution, *_ = np.linalg.lstsq(weighted, drop / np.sqrt(variance), rcond=None)
-        left = drop - design @ solution
+        fit = least_squares(design / sd[:, None], drop / sd)
+        left = drop - design @ fit.solution
         if terms == 0 and np.abs(left).max() < max(LEAST_BEND_M, LEAST_BEND_SHARE * length):
             return {}
         # Of the size of what is left: points wobble together.
-        cost = 0.5 * len(seen) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
+        cost = 0.5 * len(path) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
         if best is None or cost < best[0]:
-            spread = np.mean(left**2 / variance) * np.linalg.inv(weighted.T @ weighted)
-            best = cost, solution[1:], np.sqrt(np.diagonal(spread))[1:]
+            spread = np.mean(left**2 / variance) * fit.inverse
+            best = cost, fit.solution[1:], np.sqrt(np.diagonal(spread))[1:]
     assert best is not None
     _, found, error = best
     if len(found) < 2:

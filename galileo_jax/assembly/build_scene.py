@@ -60,7 +60,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         laws=laws_of(clip),
         expected=expected(clip, observation, half[0][int(not scenario.is_level)]),
         walls_m=tuple(wall.ends_m for wall in clip.walls),
-        way_m=float(np.hypot(*np.ptp(observation.position_m[0, :2, observation.mask[0]], axis=0))),
+        way_m=float(np.hypot(*np.ptp(observation.path().place_m[:2], axis=1))),
     )
     return Scene(surroundings, clip.objects, _timestep_s(surroundings))
 
@@ -130,9 +130,9 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
     if clip.scenario == "ramp" and declared is not None:
         return float(observation.times_s[declared]), frame_s / 3
-    seen = np.flatnonzero(observation.mask[0])
-    times, place = observation.times_s[seen], observation.position_m[0][:, seen]
-    gone = (place[0] - place[0, 0]) * math.cos(angle) - (place[1] - place[1, 0]) * math.sin(angle)
+    path = observation.path()
+    times, place, (x, y, *_) = path.times_s, path.place_m, path.gone_m
+    gone = x * math.cos(angle) - y * math.sin(angle)
     if SCENARIOS[clip.scenario].has_table:
         gone = np.where(place[0] < 0, gone, 0.0)
     moving = gone > 0.05 * gone.max()

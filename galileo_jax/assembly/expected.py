@@ -52,8 +52,8 @@ def expected(
 ) -> Mapping[str, tuple[float, float]]:
     """The two numbers of each prior, by the parameter's name; of every law that might ask."""
     declared = _declared(clip)
-    seen = np.flatnonzero(observation.mask[0])
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    path = observation.path()
+    times_s, place_m = path.times_s, path.place_m
     known = clip.is_scale_known
     if SCENARIOS[clip.scenario].has_ramp:
         if clip.starts_moving or StartVelocity.name in SCENARIOS[clip.scenario].laws:

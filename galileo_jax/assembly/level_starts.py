@@ -77,13 +77,10 @@ def _first_hit(observation: Observation, own: int, walls: Sequence[Wall]) -> int
 
     After it another turning may have begun.
     """
-    place, mask = observation.position_m[:, :2], observation.mask
-    nearest = [len(observation.times_s)]
-    for i, j in combinations(range(len(place)), 2):
-        apart = np.linalg.norm(place[j] - place[i], axis=0)
-        if (both := mask[i] & mask[j]).any():
-            nearest.append(int(np.argmin(np.where(both, apart, np.inf))))
-    for wall in walls:
-        away = distance_to_segment(np.moveaxis(place[own], 0, -1), wall.ends_m)
-        nearest.append(int(np.argmin(np.where(mask[own], away, np.inf))))
-    return min(nearest)
+    pairs = combinations(range(len(observation.names)), 2)
+    apart = [observation.apart_m(i, j) for i, j in pairs]
+    place, is_seen = observation.position_m[own, :2].T, observation.mask[own]
+    to_walls = (distance_to_segment(place, wall.ends_m) for wall in walls)
+    apart += [np.where(is_seen, away, np.inf) for away in to_walls]
+    nearest = (int(np.argmin(away)) for away in apart if np.isfinite(away).any())
+    return min(nearest, default=len(observation.times_s))

@@ -104,8 +104,10 @@ def _own(of: DeclaredTrack) -> FileTrack:
             f"objects: {', '.join(of.names)} declared, but {of.path.name} has "
             f"{', '.join(observation.names)}; the same names in the same order expected"
         )
-    if third and of.scenario.is_level != observation.is_turning:
-        column = "angle_rad" if observation.is_turning else "z_m"
+    is_level, is_turning = of.scenario.is_level, observation.is_turning
+    in_space = of.scenario.moves_in_plane and not is_level
+    if third and not (is_level if is_turning else in_space):
+        column = "angle_rad" if is_turning else "z_m"
         raise of.wrong(
             f"column '{column}': means nothing in scenario {of.file.scenario}; leave it out"
         )

@@ -20,6 +20,7 @@ import numpy as np
 from galileo_jax.experiment.hypothesis_probabilities import Belief
 from galileo_jax.experiment.proposal import Proposal
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.numerics.normal_matrix import symmetric_root
 
 NUM_DRAWS = 63  # and the mode: 64 rollouts for each hypothesis
@@ -111,8 +112,7 @@ def _summary(
 ) -> PredictedExperiment:
     """The regression of values `[draw, value]` on coordinates `[draw, u]`."""
     design = np.column_stack([np.ones(len(u)), u])
-    found, *_ = np.linalg.lstsq(design, white, rcond=None)
-    left = np.abs(white - design @ found) * np.sqrt(len(u) / max(len(u) - design.shape[1], 1))
-    return PredictedExperiment(
-        found[0], found[1:].T, np.quantile(left, ONE_SD, axis=0) ** 2, hits, root
-    )
+    fit = least_squares(design, white)
+    left = np.abs(fit.left) * np.sqrt(len(u) / max(len(u) - design.shape[1], 1))
+    rest = np.quantile(left, ONE_SD, axis=0) ** 2
+    return PredictedExperiment(fit.solution[0], fit.solution[1:].T, rest, hits, root)

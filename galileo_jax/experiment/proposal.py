@@ -18,6 +18,7 @@ from galileo_jax.clip.sizes import extents
 from galileo_jax.experiment.settings import Setting, known_as
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.scene.scene import on_ramp
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -122,10 +123,7 @@ def _start(clip: Clip, first: Problem, given: Setting, angle_deg: float) -> np.n
         up = float(given["height"]) / math.sin(angle)
     objects = clip.objects[::-1] if given.get("swap") else clip.objects
     half = [extents(one)[1] for one in objects]
-    start[0] = (
-        -up * math.cos(angle) + half[0] * math.sin(angle),
-        up * math.sin(angle) + half[0] * math.cos(angle),
-    )
+    start[0] = on_ramp(-up, half[0], angle)
     if len(start) > 1:
         start[1, 0] = float(given.get("place2", start[1, 0]))
         start[1:, 1] = half[1:]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,19 +20,26 @@ from galileo_jax.runtime.known_names import did_you_mean
 UNITS = ("_m", "_deg", "_kg", "_s", "_hz")
 MOST_LEVELS, MOST_SETTINGS = 9, 48
 
-KNOWN: Mapping[str, tuple[float, float, str]] = {
-    "height": (0.01, 10.0, "m"),
-    "release": (0.01, 10.0, "m"),
-    "angle": (1.0, 89.0, "degrees"),
-    "fps": (5.0, 1000.0, "frames per second"),
-    "place2": (0.01, 10.0, "m"),
-    "swap": (0.0, 1.0, ""),
-    "mass1": (0.001, 100.0, "kg"),
-    "mass2": (0.001, 100.0, "kg"),
+
+class Known(NamedTuple):
+    """A setting that has a meaning here."""
+
+    low: float
+    high: float
+    unit: str
+    phrase: str  # of its value
+
+
+KNOWN: Mapping[str, Known] = {
+    "height": Known(0.01, 10.0, "m", "release object 1 from {:g} m"),
+    "release": Known(0.01, 10.0, "m", "release object 1 {:g} m up the ramp"),
+    "angle": Known(1.0, 89.0, "degrees", "ramp at {:g} degrees"),
+    "fps": Known(5.0, 1000.0, "frames per second", "{:g} frames per second"),
+    "place2": Known(0.01, 10.0, "m", "object 2 at {:g} m"),  # beyond the foot
+    "swap": Known(0.0, 1.0, "", ""),  # whether the objects change places
+    "mass1": Known(0.001, 100.0, "kg", "object 1 of {:g} kg"),
+    "mass2": Known(0.001, 100.0, "kg", "object 2 of {:g} kg"),
 }
-"""Name to least, most and unit: how high object 1 is released, how far up the ramp, the ramp's
-angle, the frame rate, how far beyond the foot object 2 stands, whether the objects change places,
-and what they are made to weigh."""
 
 NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
 """What `choose.Expected` says of a setting, as next.json has it."""
@@ -135,7 +142,7 @@ def check_can(can: Can) -> None:
         if known not in KNOWN:
             hint = did_you_mean(known, KNOWN) or ";"
             raise InputError(f"--can: unknown setting {name!r}{hint} known: {', '.join(KNOWN)}")
-        low, high, unit = KNOWN[known]
+        low, high, unit, _ = KNOWN[known]
         for value in kind.levels(2):
             if not isinstance(value, Real) or not low <= float(value) <= high:
                 raise InputError(
@@ -167,17 +174,6 @@ def grid(can: Can, seed: int = 0, most: int = MOST_SETTINGS) -> list[dict[str, A
     ]
 
 
-PHRASES = {
-    "height": "release object 1 from {:g} m",
-    "release": "release object 1 {:g} m up the ramp",
-    "angle": "ramp at {:g} degrees",
-    "fps": "{:g} frames per second",
-    "place2": "object 2 at {:g} m",
-    "mass1": "object 1 of {:g} kg",
-    "mass2": "object 2 of {:g} kg",
-}
-
-
 def text_of(setting: Mapping[str, Any]) -> str:
     """A setting in words: 'release object 1 from 0.15 m, ramp at 20 degrees'."""
     parts = []
@@ -185,9 +181,10 @@ def text_of(setting: Mapping[str, Any]) -> str:
         known = known_as(name)
         if known == "swap":
             parts.append("objects swapped" if value else "objects not swapped")
+        elif known in KNOWN and isinstance(value, Real):
+            parts.append(KNOWN[known].phrase.format(value))
         else:
-            phrase = PHRASES.get(known) if isinstance(value, Real) else None
-            parts.append(phrase.format(value) if phrase else f"{name} {value}")
+            parts.append(f"{name} {value}")
     return ", ".join(parts)
 
 

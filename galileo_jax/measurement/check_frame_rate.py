@@ -20,8 +20,8 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG
-from galileo_jax.numerics.least_squares import circle, least_squares, polynomial
-from galileo_jax.numerics.periodogram import period_s
+from galileo_jax.numerics.least_squares import circle, polynomial
+from galileo_jax.numerics.periodogram import period_s, sine_through
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
@@ -94,17 +94,15 @@ def speed_doubt(clip: Clip, observation: Observation) -> str | None:
     By a parabola in time along its way: a > g sin A, which friction only lowers, by `SURE_SDS`
     standard deviations of a and of the slope's angle. On the level g sin A is 0.
     """
-    scenario, seen = SCENARIOS[clip.scenario], observation.mask[0]
+    scenario, path = SCENARIOS[clip.scenario], observation.path()
     is_asked = scenario.has_ramp and not scenario.has_table and clip.is_scale_known
-    if not is_asked or clip.ramp_angle_deg is None or seen.sum() <= MIN_POINTS:
+    if not is_asked or clip.ramp_angle_deg is None or len(path) <= MIN_POINTS:
         return None
-    place = observation.position_m[0, :2][:, seen]
-    gone = place - place[:, :1]
-    furthest = gone[:, int(np.argmax(np.hypot(*gone)))]
+    furthest = path.gone_m[:, path.farthest]
     if not furthest.any():
         return None
-    times = observation.times_s[seen]
-    fit = polynomial(times - times[0], furthest @ gone / np.hypot(*furthest), 2)
+    way_m = furthest @ path.gone_m / np.hypot(*furthest)
+    fit = polynomial(path.times_s - path.times_s[0], way_m, 2)
     found, sd, angle = 2 * float(fit.solution[0]), 2 * float(fit.sds[0]), clip.ramp_angle_deg
     found *= -1.0 if furthest[1] > 0 and angle else 1.0  # up the board
     most, rate = (clip.gravity * f(math.radians(angle)) for f in (math.sin, math.cos))
@@ -128,8 +126,8 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     scenario = SCENARIOS[clip.scenario]
     if not clip.is_scale_known:
         return None
-    seen = observation.mask[0]
-    times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
+    path = observation.path()
+    times, (x, y) = path.times_s, path.place_m[:2]
     if scenario.up_shows == "bend":
         return _of_free_body(times, y)
     if times.size < MIN_POINTS:
@@ -182,13 +180,13 @@ def thread_doubt(clip: Clip, observation: Observation) -> str | None:
     """One line where a bob's path is an arc of another radius than the thread that is declared."""
     if clip.thread_m is None or not clip.is_scale_known:
         return None
-    seen, name = observation.mask[0], observation.names[0]
-    arc = circle(*observation.position_m[0, :2][:, seen])
+    path, name = observation.path(), observation.names[0]
+    arc = circle(*path.place_m[:2])
     off = abs(arc.radius - clip.thread_m)
     is_sure = arc.is_told and off > SURE_SDS * arc.radius_sd
     if not is_sure or off < THREAD_OFF * max(arc.radius, clip.thread_m):
         return None
-    swing_s = period_s(observation.times_s[seen], observation.position_m[0, 0, seen])
+    swing_s = period_s(path.times_s, path.place_m[0])
     by_period = clip.gravity * (swing_s / (2 * math.pi)) ** 2
     return (
         f"{clip.path}: thread_m: {clip.thread_m:g}, but {name}'s path is an arc of radius "
@@ -200,8 +198,7 @@ def thread_doubt(clip: Clip, observation: Observation) -> str | None:
 def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:
     """From its period; None of less than a period, or of a swing that is no sine."""
     period = period_s(times, x)
-    turn = 2 * math.pi * times / period
-    fit = least_squares(np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1), x)
+    fit = sine_through(times, x, period)
     if np.ptp(times) < period or np.std(fit.left) > SINE * np.std(x):
         return None
     amplitude = min(float(np.hypot(*fit.solution[1:])) / thread_m, 1.0)

@@ -27,7 +27,7 @@ from jaxtyping import Float
 from scipy.special import chdtri, logsumexp
 
 from galileo_jax.numerics.least_squares import restricted_likelihood
-from galileo_jax.numerics.random_patterns import random_patterns
+from galileo_jax.numerics.random_patterns import alone, random_patterns
 from galileo_jax.numerics.runs import stretches
 from galileo_jax.observation.observation import AWAY_M, Observation
 from galileo_jax.tracking.noise import SETTLES_FRAMES
@@ -75,14 +75,12 @@ def with_errors_at_rest(observation: Observation) -> Observation:
             continue
         for rest, axis in product(rests, range(observation.position_m.shape[1])):
             sd = np.sqrt(observation.covariance_m2[i, axis, axis, rest])
-            alone, together = _errors(observation.position_m[i, axis, rest], sd, usual)
-            covariance[i, axis, :, rest] *= np.sqrt(alone)
-            covariance[i, :, axis, rest] *= np.sqrt(alone)
-            least = FAINT * alone / max(np.linalg.eigvalsh(together)[-1], 1e-300)
-            for pattern in random_patterns(together, least):
-                mode = np.zeros_like(observation.position_m)
-                mode[i, axis, rest] = pattern * sd
-                errors.append(mode)
+            single, together = _errors(observation.position_m[i, axis, rest], sd, usual)
+            covariance[i, axis, :, rest] *= np.sqrt(single)
+            covariance[i, :, axis, rest] *= np.sqrt(single)
+            least = FAINT * single / max(np.linalg.eigvalsh(together)[-1], 1e-300)
+            patterns = random_patterns(together, least)
+            errors += [alone(observation.position_m, i, axis, own * sd, rest) for own in patterns]
     return replace(observation.with_modes(shifts, errors), covariance_m2=covariance)
 
 
@@ -115,10 +113,10 @@ def _shifts(
             continue
         in_motion = np.median(variance[:, moving], axis=1)
         shift2 = SHIFT_SHARE * (in_motion - usual * np.median(variance[:, rest], axis=1))
-        for axis in np.flatnonzero(shift2 > 0):
-            mode = np.zeros_like(observation.position_m)
-            mode[i, axis, rest] = np.sqrt(shift2[axis])
-            found.append(mode)
+        found += [
+            alone(observation.position_m, i, axis, np.sqrt(shift2[axis]), rest)
+            for axis in np.flatnonzero(shift2 > 0).tolist()
+        ]
     return found
 
 
@@ -171,9 +169,9 @@ def _errors(
     evidence = -(determinant + degrees * np.log(square)) / 2
     weight = np.exp(evidence - logsumexp(evidence)) * square / (degrees - 2)
     lasting = (1 - FRESH) * np.einsum("k,kab->ab", weight[1:], _kernels(len(sd_m)))
-    alone = float(weight[0] + FRESH * weight[1:].sum())
+    single = float(weight[0] + FRESH * weight[1:].sum())
     # Not among the independent ones: how large those are in motion a frozen picture does not tell.
-    return alone, lasting + max(LEAST_SCALE**2 - alone, 0.0) * np.eye(len(sd_m))
+    return single, lasting + max(LEAST_SCALE**2 - single, 0.0) * np.eye(len(sd_m))
 
 
 def _likelihood(

@@ -36,7 +36,7 @@ from galileo_jax.clip.track_noise import position_noise_m
 from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
 from galileo_jax.measurement.shared_errors import beside, with_errors
 from galileo_jax.measurement.track_cache import track_once
-from galileo_jax.numerics.random_patterns import random_patterns
+from galileo_jax.numerics.random_patterns import alone, random_patterns
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.motion_compensation import LASTS_FRAMES
@@ -146,9 +146,8 @@ def with_coding_errors(clip: Clip, observation: Observation, track: Track) -> Ob
                 continue
             size = np.linalg.norm(shift, axis=0)
             for pattern in random_patterns(size[:, None] * wander * size, FAINT):
-                mode = np.zeros_like(observation.position_m)
-                mode[i][:, seen] = shift / np.where(size > 0, size, 1.0) * pattern
-                found.append(mode)
+                mode = shift / np.where(size > 0, size, 1.0) * pattern
+                found.append(alone(observation.position_m, i, slice(None), mode, seen))
     return observation.with_modes(errors=found) if found else observation
 
 
@@ -163,12 +162,8 @@ def _shift_of_some(
     size_px2 = np.where(seen, np.einsum("fii->f", track.common_px2[index]) / 2, 0.0)
     if not (size_px2 > 0).any() or (size_px2[seen] > 0).all():
         return []
-    found = []
-    for axis in range(2):
-        mode = np.zeros_like(observation.position_m)
-        mode[index] = np.where(seen, np.sqrt(size_px2) * slope[index, :, :, axis].T, 0.0)
-        found.append(mode)
-    return found
+    shifts = np.where(seen, np.sqrt(size_px2) * slope[index].T, 0.0)
+    return [alone(observation.position_m, index, slice(None), own) for own in shifts]
 
 
 def with_camera_modes(clip: Clip, observation: Observation, track: Track) -> Observation:

@@ -94,11 +94,11 @@ def distance_at_hit(observation: Observation) -> tuple[int, int, float, float] |
     """
     times = observation.times_s
     for i, j in combinations(range(len(observation.names)), 2):
-        both = np.flatnonzero(observation.mask[i] & observation.mask[j])
+        apart = observation.apart_m(i, j)
+        both = np.flatnonzero(np.isfinite(apart))
         if len(both) < 2 * BESIDE + 2:
             continue
-        place = observation.position_m[:, :2]
-        apart = np.linalg.norm(place[j] - place[i], axis=0)[both]
+        apart = apart[both]
         at = int(np.argmin(apart))
         # Frames beside the nearest: the hit falls into one exposure or the next.
         before, after = slice(max(at - BESIDE, 0), at), slice(at + 1, at + 1 + BESIDE)
@@ -119,7 +119,7 @@ def distance_at_hit(observation: Observation) -> tuple[int, int, float, float] |
 def _with_radii(clip: Clip, radii: list[float]) -> Clip:
     """The clip with radii of the pucks that have none."""
     objects = tuple(
-        item if item.size_m is not None else item.model_copy(update={"size_m": (radius, HEIGHT_M)})
+        item.model_copy(update={"size_m": item.size_m or (radius, HEIGHT_M)})
         for item, radius in zip(clip.objects, radii, strict=True)
     )
     return clip.model_copy(update={"objects": objects})

@@ -55,7 +55,7 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
       InputError: it hardly moves on the ramp, against the declared direction, or on the level.
     """
     name = observation.names[0]
-    points = observation.position_m[0][:, observation.mask[0]]
+    points = observation.path().place_m
     has_foot = SCENARIOS[clip.scenario].has_table and points.size > 0
     if has_foot:
         points = points[:, points[0] < (1 - UPPER_SHARE) * min(points[0, 0], 0.0)]
@@ -180,7 +180,7 @@ def _bend(observation: Observation, half_length_m: float) -> tuple[np.ndarray, f
 
     None where it does not bend, as where it does not reach the table.
     """
-    points = observation.position_m[0][:, observation.mask[0]]
+    points = observation.path().place_m
     best = two_lines(points, MIN_POINTS)
     if best is None or not falls_deg(best[0]) - falls_deg(best[1]) >= MIN_BEND_DEG:
         return None
@@ -207,11 +207,11 @@ def end_of_slope(observation: Observation) -> int | None:
     Two straight lines that differ by `SEEN_DEG`, and clearly, and leave a third of what a parabola
     does: a path that bends all along has no such end, nor what rests before it goes.
     """
-    frames = np.flatnonzero(observation.mask[0])
-    frames = frames[:: -(-len(frames) // MOST_POINTS) or 1]
-    points = observation.position_m[0][:2, frames]
+    path = observation.path()
+    path = path[:: -(-len(path) // MOST_POINTS) or 1]
+    points, frames = path.place_m[:2], path.frames
     lasting = np.sum(observation.lasting_m[:, 0][..., frames] ** 2, axis=(0, 1)) / 2
-    variance = observation.variance_m2[0, frames] + lasting
+    variance = path.variance_m2 + lasting
     best = two_lines(points, 2 * MIN_POINTS)
     if best is None:
         return None
@@ -271,7 +271,7 @@ def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[floa
 
 def _height(observation: Observation, k: int, angle: float) -> float:
     """Of the centre above the surface, m."""
-    x, y = observation.position_m[k][:, observation.mask[k]]
+    x, y = observation.path(k).place_m
     if not x.size:
         return MIN_SIZE_M  # never seen: building the scene refuses it
     above_ramp = y * math.cos(angle) + x * math.sin(angle)

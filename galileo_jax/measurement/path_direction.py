@@ -49,15 +49,15 @@ def other_way(clip: Clip, observation: Observation) -> OtherWay | None:
     scenario = SCENARIOS[clip.scenario]
     declared = clip.ramp_angle_deg if scenario.has_ramp else 90.0
     is_line = not (scenario.moves_in_plane or scenario.is_level or scenario.has_table)
-    points = observation.position_m[0][:, observation.mask[0]]
-    if not is_line or declared is None or len(points) != 2 or points.shape[1] < MIN_POINTS:
+    seen = observation.path()
+    points = seen.place_m
+    if not is_line or declared is None or len(points) != 2 or len(seen) < MIN_POINTS:
         return None
     line = line_through(points)
     away = points - line.middle[:, None]
     if not (length := float(np.ptp(line.along @ away))):
         return None
-    noise = float(np.median(observation.variance_m2[0, observation.mask[0]]))
-    scatter = max(line.spread[0] / (points.shape[1] - 2), noise)
+    scatter = max(line.spread[0] / (len(seen) - 2), float(np.median(seen.variance_m2)))
     sd = math.degrees(math.sqrt(scatter / line.spread[1]))
     path = falls_deg(line)
     is_spring = "spring" in scenario.laws
@@ -84,7 +84,7 @@ def rises_forward(clip: Clip, observation: Observation) -> bool:
     By as much as it is declared to fall, where that is declared. A table of metres has no
     `direction`.
     """
-    points = observation.position_m[0][:, observation.mask[0]]
+    points = observation.path().place_m
     if clip.is_own_track or points.shape[1] < MIN_POINTS:
         return False
     line = line_through(points)
@@ -150,10 +150,10 @@ def way_text(clip: Clip, way: OtherWay) -> str:
 
 def path_doubt(clip: Clip, observation: Observation) -> str | None:
     """One line where an object goes straight on where its scenario does not; else None."""
-    seen, name = observation.mask[0], observation.names[0]
-    if clip.scenario not in ("pendulum", "fall", "ramp") or not seen.any():
+    path, name = observation.path(), observation.names[0]
+    if clip.scenario not in ("pendulum", "fall", "ramp") or not len(path):
         return None
-    place = observation.position_m[0, :2][:, seen]
+    place = path.place_m[:2]
     if clip.scenario == "ramp":
         place = place[:, place[0] > 0]
         if place.shape[1] < MIN_POINTS:
@@ -173,8 +173,7 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
                 f"{clip.path}: {name} goes along {likely.why}, and what falls goes straight down "
                 "(perhaps scenario: flight)"
             )
-        gone = place - place[:, :1]
-        across, up = gone[:, int(np.argmax(np.hypot(*gone)))]
+        across, up = path.gone_m[:2, path.farthest]
         if abs(across) <= abs(up):  # no camera is turned by more
             return None
         return (
@@ -182,7 +181,7 @@ def path_doubt(clip: Clip, observation: Observation) -> str | None:
             "what falls goes down: mark the thing that is meant (`--point X Y`), or turn the film "
             "if its camera lay on its side"
         )
-    if _goes_round(observation.times_s[seen], place):
+    if _goes_round(path.times_s, place):
         return (
             f"{clip.path}: {name} goes round and round at an even speed; what hangs on a thread is "
             "slower above than below (is it seen from above, where nothing hangs?)"

@@ -168,7 +168,7 @@ def noisy(
 
     Args:
       position: `[object, 2, frame]`, m, the motion itself, which tells who rests.
-      seen: the same shape, see `filmed`.
+      seen: the same shape, see `measured`.
       times: `[frame]`, s.
       noise: `[object]`, m, of what moves.
       scatter: share of the noise that is independent in the frames of a rest, LEAST_SCALE to 1.

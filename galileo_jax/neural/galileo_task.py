@@ -9,7 +9,6 @@ import numpy as np
 from flax import nnx
 
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
-from galileo_jax.model.parameters import Uniform
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -152,12 +151,11 @@ def estimate(
     t[untold, :, 1:] = generator.standard_normal((int(untold.sum()), count, 2))
     untold &= np.asarray(sample["is_ideal"], bool)
     t[untold, :, 1:] = _of_ideal_prior(generator, (int(untold.sum()), count))
-    friction = Uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high)
     ratio = np.exp(np.sqrt(2) * MASS_PRIOR.sd * t[..., 1])
     return Estimates(
-        np.asarray(friction.forward(jnp.asarray(t[..., 0]))),
+        np.asarray(FRICTION_PRIOR.forward(jnp.asarray(t[..., 0]))),
         ratio,
-        np.asarray(friction.forward(jnp.asarray(t[..., 2]))),
+        np.asarray(FRICTION_PRIOR.forward(jnp.asarray(t[..., 2]))),
     )
 
 

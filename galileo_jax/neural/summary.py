@@ -9,10 +9,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
-from galileo_jax.model.parameters import Uniform
+from galileo_jax.model.model import MASS_PRIOR
 from galileo_jax.neural.closed_form import LEAST_FRAMES, Phases, fit_phases
 from galileo_jax.neural.seen import Seen
+from galileo_jax.neural.world import Truth, targets
 from galileo_jax.similarity import discrepancy
 
 QUARTIC = 0.02  # of t^4 / 4, what no parabola fits, root mean square
@@ -67,11 +67,8 @@ def summarise(seen: Seen) -> Summary:
 def _estimates(phases: Phases) -> tuple[jax.Array, jax.Array]:
     """`centre` and `scale` of the summary."""
     after, friction1, friction2 = phases.after, phases.friction1, phases.friction2
-    prior_k = Uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high)
+    centre = targets(Truth(friction1.value, friction2.value, phases.ratio.value))
     log_ratio_sd = jnp.sqrt(2.0) * MASS_PRIOR.sd
-    log_ratio = jnp.log(phases.ratio.value) / log_ratio_sd
-    centre = [prior_k.inverse(friction1.value), log_ratio, prior_k.inverse(friction2.value)]
-    centre = jnp.stack(centre)
     density = jnp.exp(-0.5 * centre**2) / jnp.sqrt(2 * jnp.pi)
     scale = [friction1.sd / density[0], phases.ratio.sd / log_ratio_sd, friction2.sd / density[2]]
     scale = jnp.stack(scale)

@@ -23,11 +23,11 @@ def random_patterns(
 def alone(
     position: Float[np.ndarray, "object axis frame"],
     i: int,
-    axis: int,
+    axis: int | slice,
     values: Any,
-    frames: slice = slice(None),
+    frames: slice | np.ndarray = slice(None),
 ) -> Float[np.ndarray, "object axis frame"]:
     """A pattern of the shape of `position` that moves object i along an axis in some frames."""
     found = np.zeros_like(position)
-    found[i, axis, frames] = values
+    found[i][axis, frames] = values
     return found

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from galileo_jax.numerics.least_squares import LinearFit, polynomial
+
 UNMEASURED_SD_M = 10.0
 """Across the way of a motion of which one coordinate was measured: the error says nothing, and is
 still small enough for the other's to keep its digits in one covariance."""
@@ -39,6 +41,20 @@ class PointPath:
         return PointPath(
             self.frames[part], self.times_s[part], self.place_m[:, part], self.variance_m2[part]
         )
+
+    @property
+    def gone_m(self) -> Float[np.ndarray, "axis place"]:
+        """From the first place to each."""
+        return self.place_m - self.place_m[:, :1]
+
+    @property
+    def farthest(self) -> int:
+        """Which place is farthest from the first in the plane."""
+        return int(np.argmax(np.hypot(*self.gone_m[:2])))
+
+    def polynomial(self, degree: int, zero_s: float) -> LinearFit:
+        """A polynomial of the time since `zero_s` through the places, highest power first."""
+        return polynomial(self.times_s - zero_s, self.place_m.T, degree)
 
 
 @dataclass(frozen=True)

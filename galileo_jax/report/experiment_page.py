@@ -111,7 +111,7 @@ def _names(record: Mapping[str, Any]) -> Sequence[str]:
 
 def _title(name: str) -> str:
     known = known_as(name)
-    unit = KNOWN[known][2] if known in KNOWN else ""
+    unit = KNOWN[known].unit if known in KNOWN else ""
     return f"{known}, {unit}" if unit else known
 
 

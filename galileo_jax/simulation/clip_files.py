@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.load import check_clip
+from galileo_jax.clip.schema import ClipObject
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import write_json, write_text
@@ -28,6 +29,17 @@ def write_yaml_and_truth(out: Path, content: Mapping[str, Any], record: Mapping[
     check_clip(out.with_suffix(YAML_SUFFIX), content)
     write_json(out.with_suffix(TRUTH_SUFFIX), record)
     write_text(out.with_suffix(YAML_SUFFIX), yaml_text(content))
+
+
+def declared_objects(objects: Sequence[ClipObject]) -> list[dict[str, Any]]:
+    """What a clip's yaml says of the objects of a truth."""
+    return [
+        {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
+        | ({} if each.rolls is None else {"rolls": each.rolls})
+        | ({} if each.mass_kg is None else {"mass_kg": float(f"{each.mass_kg:.4g}")})
+        | ({"z_m": each.z_m} if each.z_m else {})
+        for each in objects
+    ]
 
 
 def noisy_track(

@@ -1,7 +1,7 @@
 """Hiding an effect in a truth: how strong it is made where nobody says."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -93,15 +93,12 @@ def prior_value(parameter: Parameter, z: float) -> float:
         return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
 
 
-def check_parameters(
-    effect: Effect, given: Mapping[str, float], parameters: Sequence[Parameter]
-) -> None:
-    """Raises `InputError` where a given name is none of the effect's parameters."""
-    names = [parameter.name for parameter in parameters]
+def check_given(option: str, owner: str, given: Iterable[str], known: Collection[str]) -> None:
+    """Raises `InputError` where a given name is none of the owner's parameters."""
     for name in given:
-        if name not in names:
-            known = ", ".join(names)
-            raise InputError(f"--effect: {effect.name} has no parameter {name!r}; known: {known}")
+        if name not in known:
+            listed = ", ".join(known)
+            raise InputError(f"{option}: {owner} has no parameter {name!r}; known: {listed}")
 
 
 def with_given(
@@ -112,10 +109,7 @@ def with_given(
     Raises:
       InputError: a given name is no parameter of the scenario.
     """
-    for name in given:
-        if name not in drawn:
-            known = ", ".join(drawn)
-            raise InputError(f"--set: {scenario} has no parameter {name!r}; known: {known}")
+    check_given("--set", scenario, given, drawn)
     return {name: float(given.get(name, value)) for name, value in drawn.items()}
 
 
@@ -130,7 +124,7 @@ def hide(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     names = [parameter.name for parameter in parameters]
     if not names:
         raise InputError(f"--effect: {effect.name} has no place in this scene")
-    check_parameters(effect, given, parameters)
+    check_given("--effect", effect.name, given, names)
     share = float(rng.uniform()) if strength is None else strength
     values: dict[str, float] = {}
     # A zone's start is drawn last: its length has to fit in.

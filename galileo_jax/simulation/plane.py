@@ -19,7 +19,7 @@ from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import laid_out
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
+from galileo_jax.simulation.hidden import Hidden, check_given, prior_value
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2, Declared
 
 Point = tuple[float, float]
@@ -101,7 +101,7 @@ def hide_in_plane(truth: PlaneTruth, hidden: Hidden, rng: np.random.Generator) -
     parameters = effect.parameters(truth.surroundings)
     if effect.name in SCENARIOS[truth.scenario].without or not parameters:
         raise InputError(f"--effect: {effect.name} has no place in scenario {truth.scenario}")
-    check_parameters(effect, given, parameters)
+    check_given("--effect", effect.name, given, [parameter.name for parameter in parameters])
     share = {parameters[0].name: strength}
     drawn = {p.name: given.get(p.name, _drawn(p, rng, share.get(p.name))) for p in parameters}
     return replace(truth, values={**truth.values, **drawn}, effects=(*truth.effects, effect))

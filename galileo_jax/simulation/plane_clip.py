@@ -18,7 +18,7 @@ from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation import clip_files
-from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
+from galileo_jax.simulation.clip_files import WriteClip, declared_objects, write_yaml_and_truth
 from galileo_jax.simulation.filming import (
     MARGIN_M,
     declared_picture,
@@ -159,11 +159,7 @@ def declared_content(truth: PlaneTruth, fps: float) -> dict[str, Any]:
         content["floor"] = True
     if Liquid.name in truth.surroundings.laws:
         content["liquid_density"] = WATER_KG_M3
-    content["objects"] = [
-        {"name": thing.name, "shape": thing.shape, "size_m": list(thing.size_m or ())}
-        | ({} if thing.mass_kg is None else {"mass_kg": float(f"{thing.mass_kg:.4g}")})
-        for thing in truth.things
-    ]
+    content["objects"] = declared_objects(truth.things)
     if truth.walls_m:
         content["walls"] = [
             {"from_m": list(one), "to_m": list(other)} for one, other in truth.walls_m

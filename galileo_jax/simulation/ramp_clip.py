@@ -1,6 +1,6 @@
 """Clips of objects on a ramp: trials of the same objects, drawn, and then written one by one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,12 @@ from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.runtime import progress
-from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
+from galileo_jax.simulation.clip_files import (
+    WriteClip,
+    declared_objects,
+    noisy_track,
+    write_yaml_and_truth,
+)
 from galileo_jax.simulation.filming import declared_picture, film_ramp, filming_of, ramp_camera
 from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import LONGEST_S, Motion, Solver, roll_out
@@ -42,20 +47,28 @@ def ramp_clips(settings: Settings, hidden: Sequence[Hidden], stem: str) -> list[
     looks, things, faults, secrets = np.random.default_rng(settings.seed).spawn(4)
     fields = {key: getattr(settings, key) for key in ("m1", "k1", "m2", "k2", "z2")}
     given = {key: value for key, value in fields.items() if value is not None}
+    solver: Solver = "free" if settings.motion == "free" else settings.solver
+    frame_s = 1 / settings.fps if settings.faults else None
     trials = draw_series(
         settings.angle,
         given | dict(settings.values),
         hidden,
         settings.series or 1,
-        solver="free" if settings.motion == "free" else settings.solver,
+        solver=solver,
         things=things,
         secrets=secrets,
-        frame_s=1 / settings.fps if settings.faults else None,
+        frame_s=frame_s,
         scenario=settings.scenario,
         shapes=shapes_of(settings),
     )
-    if settings.like is not None or settings.release is not None:
-        trials = [_set_up(settings, trials[0][0], secrets)]
+    truth = trials[0][0]
+    if settings.like is not None:
+        truth = truth_like(Path(settings.like), settings.angle, settings.scenario)
+        truth = with_faults(truth, secrets, frame_s)
+    if settings.release is not None:
+        truth = replace(truth, release_m=settings.release)
+    if truth is not trials[0][0]:
+        trials = [(truth, roll_out(truth, solver))]
     series = stem if settings.series else None
     return [
         partial(
@@ -63,20 +76,6 @@ def ramp_clips(settings: Settings, hidden: Sequence[Hidden], stem: str) -> list[
         )
         for i, (truth, motion) in enumerate(trials)
     ]
-
-
-def _set_up(settings: Settings, drawn: Truth, secrets: np.random.Generator) -> tuple[Truth, Motion]:
-    """The truth that was drawn, or that of an earlier clip, with the release that is asked for."""
-    truth = drawn
-    if settings.like is not None:
-        truth = with_faults(
-            truth_like(Path(settings.like), settings.angle, settings.scenario),
-            secrets,
-            1 / settings.fps if settings.faults else None,
-        )
-    if settings.release is not None:
-        truth = replace(truth, release_m=settings.release)
-    return truth, roll_out(truth, "free" if settings.motion == "free" else settings.solver)
 
 
 def _write(
@@ -132,12 +131,7 @@ def _content(
     rng: np.random.Generator,
 ) -> dict[str, Any]:
     """What the yaml declares about the clip (docs/reference/clip_yaml.md)."""
-    objects: list[dict[str, Any]] = [
-        {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
-        | ({} if each.rolls is None else {"rolls": each.rolls})
-        | ({"z_m": each.z_m} if each.z_m else {})
-        for each in truth.objects
-    ]
+    objects = declared_objects(truth.objects)
     picture: dict[str, Any] = {}
     if not settings.track_only:
         off = {
@@ -189,28 +183,20 @@ def draw_series(
     `things` draws the experiments, `secrets` what is hidden. See `draw_truth`, `with_faults` (which
     has `frame_s`) and `roll_out` for the others.
     """
-    first, motion = _try(
-        lambda: _with_hidden(
-            draw_truth(things, ramp_angle_deg, given, scenario, shapes), hidden, secrets, frame_s
-        ),
-        solver,
-    )
-    trials = [(first, motion)]
+
+    def trial(draw: Callable[[], Truth], effects: Sequence[Hidden]) -> tuple[Truth, Motion]:
+        return _try(lambda: _with_hidden(draw(), effects, secrets, frame_s), solver)
+
+    trials = [trial(lambda: draw_truth(things, ramp_angle_deg, given, scenario, shapes), hidden)]
+    first = trials[0][0]
     known = [_shared(each, first) for each in hidden]
     while len(trials) < count:
         progress.report("simulating", len(trials) / count)
-        trials.append(
-            _try(
-                lambda: _with_hidden(
-                    _moved(first, ramp_angle_deg, given, things), known, secrets, frame_s
-                ),
-                solver,
-            )
-        )
+        trials.append(trial(lambda: _moved(first, ramp_angle_deg, given, things), known))
     return trials
 
 
-def _try(draw, solver: Solver) -> tuple[Truth, Motion]:
+def _try(draw: Callable[[], Truth], solver: Solver) -> tuple[Truth, Motion]:
     """The first of some draws in which the objects on the table are hit; else the last."""
     for _ in range(NUM_TRIES):
         truth = draw()

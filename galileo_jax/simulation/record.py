@@ -25,7 +25,6 @@ def truth_record(
     hidden = {name: found for name, found in parameters.items() if found}
     names = [parameter.name for found in hidden.values() for parameter in found]
     values = truth.effect_values
-    stand_m = (truth.object2_x_m, *truth.beyond_x_m)[: len(truth.objects) - 1]
     events = motion.events_s(truth)
     return {
         "engine": "galileo_jax",
@@ -39,7 +38,7 @@ def truth_record(
         "ramp_angle_deg_true": truth.ramp_angle_deg,
         "ramp_angle_deg_declared": declared.ramp_angle_deg,
         "release_m": truth.release_m,
-        **{f"object{i}_y_m": place for i, place in enumerate(stand_m, 2)},
+        **{f"object{i}_y_m": place for i, place in enumerate(truth.stand_x_m, 2)},
         **{f"size{i}_m": each.size_m for i, each in enumerate(truth.objects, 1)},
         "shapes": [each.shape for each in truth.objects],
         "rolls": [each.rolls for each in truth.objects],

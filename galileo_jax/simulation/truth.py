@@ -34,10 +34,9 @@ class Truth:
     ramp_angle_deg: float  # of the ramp
     objects: tuple[ClipObject, ...]  # names, shapes and sizes
     release_m: float  # distance up the ramp from the foot to the point under object 1's centre
-    object2_x_m: float  # where object 2's centre stands
+    stand_x_m: tuple[float, ...]  # where the centres of the objects on the table stand
     gravity: float = GRAVITY_M_S2  # m/s^2
     scenario: str = "ramp"  # ramp, multi or incline
-    beyond_x_m: tuple[float, ...] = ()  # where the centres of the objects beyond object 2 stand
     # What is hidden in the clip, in the motion or in what is declared of it
     effects: tuple[Effect, ...] = ()
     # Their parameters by name, all of them
@@ -68,10 +67,9 @@ class Truth:
     def surroundings(self) -> Surroundings:
         """The geometry as the scene and the effects see it."""
         half = [extents(declared) for declared in self.objects]
-        standing = (self.object2_x_m, *self.beyond_x_m)[: len(half) - 1]
         start = (
             on_ramp(-self.release_m, half[0][1], self.angle_rad),
-            *((x, height) for x, (_, height) in zip(standing, half[1:], strict=True)),
+            *((x, height) for x, (_, height) in zip(self.stand_x_m, half[1:], strict=True)),
         )
         has_table = SCENARIOS[self.scenario].has_table
         return Surroundings(
@@ -96,7 +94,7 @@ class Truth:
             return math.sqrt(twice_g * (sin - rubs) * down) * (cos + beta) / (1 + beta)
         at_foot = twice_g * (sin - k1 * cos) * down
         beyond = max(0.0, at_foot) * max(0.0, cos - k1 * sin) ** 2
-        run = self.object2_x_m - sum(where.half_length_m[:2]) - where.corner_m[0]
+        run = self.stand_x_m[0] - sum(where.half_length_m[:2]) - where.corner_m[0]
         return math.sqrt(max(0.0, beyond - twice_g * k1 * run))
 
 
@@ -159,10 +157,9 @@ def truth_like(path: Path, ramp_angle_deg: float, scenario: str) -> Truth:
                 for i, shape, rolls in zip(numbers, record["shapes"], record["rolls"], strict=True)
             ),
             release_m=float(record["release_m"]),
-            object2_x_m=float(record.get("object2_y_m", 0.0)),
+            stand_x_m=tuple(float(record[f"object{i}_y_m"]) for i in numbers if i > 1),
             gravity=float(record["gravity"]),
             scenario=scenario,
-            beyond_x_m=tuple(float(record[f"object{i}_y_m"]) for i in numbers if i > 2),
             effects=tuple(make_effects(names)),
             effect_values=values,
         )
@@ -188,11 +185,10 @@ def draw_truth(
     Places across the travel (z2) are 0 where not given. `shapes`: of the objects, in the order of
     the travel; what is round rolls.
     """
-    truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
-    for _ in range(NUM_TRIES):
+    for _ in range(NUM_TRIES + 1):
+        truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
         if len(shapes) < 2 or truth.hit_speed_m_s > SLOWEST_HIT_M_S:
             break
-        truth = _draw(rng, ramp_angle_deg, given, scenario, shapes)
     return truth
 
 
@@ -206,13 +202,13 @@ def _draw(
     mass1, mass2 = np.exp(rng.uniform(np.log(0.15), np.log(1.0), 2))
     k1, k2 = rng.uniform((0.03, 0.05), (0.26, 0.32))
     sizes = list(rng.uniform(0.045, 0.080, (2, 3)).round(3))
-    release, object2_x = float(rng.uniform(0.40, 0.65)), float(rng.uniform(0.20, 0.30))
-    mass, friction, beyond = [mass1, mass2], [k1, k2], [object2_x]
+    release, stand = float(rng.uniform(0.40, 0.65)), [float(rng.uniform(0.20, 0.30))]
+    mass, friction = [mass1, mass2], [k1, k2]
     for _ in shapes[2:]:
         mass.append(np.exp(rng.uniform(np.log(0.15), np.log(1.0))))
         friction.append(rng.uniform(0.05, 0.32))
         sizes.append(rng.uniform(0.045, 0.080, 3).round(3))
-        beyond.append(beyond[-1] + float(rng.uniform(0.09, 0.13)))
+        stand.append(stand[-1] + float(rng.uniform(0.09, 0.13)))
     objects = tuple(
         ClipObject(
             name=f"object{i + 1}",
@@ -230,9 +226,8 @@ def _draw(
         ramp_angle_deg=ramp_angle_deg,
         objects=objects,
         release_m=release,
-        object2_x_m=object2_x,
+        stand_x_m=tuple(stand[: len(shapes) - 1]),
         scenario=scenario,
-        beyond_x_m=tuple(beyond[1:]),
     )
 
 

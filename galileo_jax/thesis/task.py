@@ -164,6 +164,6 @@ def _model(frames: int) -> Model:
         ramp_angle_deg=RAMP_ANGLE_DEG,
         objects=(first, second),
         release_m=RELEASE_M,
-        object2_x_m=OBJECT2_M,
+        stand_x_m=(OBJECT2_M,),
     )
     return Model(Scene(truth.surroundings, truth.objects), frames / FPS, nuisances=())

@@ -124,3 +124,13 @@ def test_what_is_wrong_is_one_line(tmp_path):
     table.write_text("\n".join(",".join(row.split(",")[:3]) for row in rows))
     with pytest.raises(InputError, match="track_up: z, but flight"):
         load_clip(path)
+
+
+@pytest.mark.parametrize("scenario", ["fall", "spring", "liquid", "level", "incline"])
+def test_what_keeps_to_a_line_is_not_seen_in_space(tmp_path, scenario):
+    path = write(tmp_path)
+    more = "\nramp_angle_deg: 20" if scenario == "incline" else ""
+    text = path.read_text().replace("track_up: z\nscenario: flight", f"scenario: {scenario}{more}")
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"'z_m': means nothing in scenario {scenario}"):
+        measure(load_clip(path))

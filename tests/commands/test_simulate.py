@@ -35,7 +35,7 @@ def reference(truth: Truth, times_s: np.ndarray) -> Solution:
         truth.angle_rad,
         (size1, size2),
         truth.release_m,
-        truth.object2_x_m,
+        truth.stand_x_m[0],
         truth.gravity,
     )
     return solve(experiment, times_s)

@@ -100,7 +100,7 @@ def test_a_series_shares_the_objects_and_the_effect():
     told = [truth for truth, _ in trials(hidden("air_drag"), hidden("initial_push"), count=3)]
     for key in ("mass_kg", "friction", "objects", "ramp_angle_deg"):
         assert len({getattr(truth, key) for truth in told}) == 1
-    for key in ("release_m", "object2_x_m"):
+    for key in ("release_m", "stand_x_m"):
         assert len({getattr(truth, key) for truth in told}) == 3
     assert len({truth.effect_values["air_drag"] for truth in told}) == 1
     assert len({truth.effect_values["initial_push"] for truth in told}) == 3

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool
 from scipy import special
 
-from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.numerics.runs import stretches
 from galileo_jax.observation.observation import Observation, PointPath
 
@@ -99,14 +99,14 @@ def last_before(path: PointPath, about: int) -> int:
     scatter. A blow that lasts takes further frames: those off the parabola of the frames before.
     """
     begin, end = max(about - PARABOLA_FRAMES + 1, 0), about + PARABOLA_FRAMES + 1
-    times, place = path.times_s[begin:end] - path.times_s[about], path.place_m[:, begin:end].T
-    floor = FLOOR * float(np.median(path.variance_m2[begin:end])) * np.eye(place.shape[1])
+    variance = float(np.median(path.variance_m2[begin:end]))
+    floor = FLOOR * variance * np.eye(len(path.place_m))
     cost = {}
     for last in range(about - STEPS, about + STEPS + 1):
-        sides = slice(None, last + 1 - begin), slice(last + 1 - begin, None)
-        if min(len(times[side]) for side in sides) < FEWEST:
+        sides = path[begin : last + 1], path[last + 1 : end]
+        if min(map(len, sides)) < FEWEST:
             continue
-        left = np.concatenate([polynomial(times[side], place[side], 2).left for side in sides])
+        left = np.concatenate([side.polynomial(2, path.times_s[about]).left for side in sides])
         cost[last] = len(left) * np.linalg.slogdet(left.T @ left / len(left) + floor)[1]
     last = max(last for last, one in cost.items() if one <= min(cost.values()) + AS_WELL)
     for _ in range(SMEARED):
@@ -122,11 +122,11 @@ def continues(path: PointPath, last: int, own: slice | None = None, most_sds: fl
     Without `own` it is that of those before it.
     """
     own = slice(max(last - PARABOLA_FRAMES, 0), last) if own is None else own
-    since = path.times_s[own] - path.times_s[last]
-    if len(since) < FEWEST:
+    near = path[own]
+    if len(near) < FEWEST:
         return True
-    fit = polynomial(since, path.place_m[:, own].T, 2)
-    scatter = np.sum(fit.left**2, axis=0) / max(len(since) - 3, 1)
+    fit = near.polynomial(2, path.times_s[last])
+    scatter = np.sum(fit.left**2, axis=0) / max(len(near) - 3, 1)
     known = np.maximum(scatter, path.variance_m2[last]) * (1 + fit.inverse[2, 2])
     return bool(np.all((path.place_m[:, last] - fit.solution[2]) ** 2 <= most_sds**2 * known))
 

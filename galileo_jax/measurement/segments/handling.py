@@ -19,7 +19,7 @@ import numpy as np
 
 from galileo_jax.measurement.segments.blow import SMEARED, continues
 from galileo_jax.measurement.segments.rest import is_one_place
-from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
@@ -61,11 +61,8 @@ def hand_frame(observation: Observation, least_m_s2: float = 0.0) -> int | None:
 
 def goes_up(observation: Observation) -> bool:
     """Whether object 1 goes up its board first, against `Clip.direction`."""
-    place = observation.path().place_m
-    if not place.size:
-        return False
-    away = place - place[:, :1]
-    return bool(away[0, int(np.argmax(np.hypot(*away[:2])))] < 0)
+    path = observation.path()
+    return bool(len(path) and path.gone_m[0, path.farthest] < 0)
 
 
 def pushed_frame(observation: Observation, index: int = 0, least_m_s2: float = 0.0) -> int | None:
@@ -152,7 +149,7 @@ def comes_free(observation: Observation, last: int) -> bool:
     parts = path[max(at - FREE_FRAMES, 0) : at], path[at + SMEARED : at + SMEARED + FREE_FRAMES]
     if min(map(len, parts)) < FEWEST:
         return False
-    fits = [polynomial(part.times_s - part.times_s[0], part.place_m.T, 2) for part in parts]
+    fits = [part.polynomial(2, part.times_s[0]) for part in parts]
     held, free = (2 * fit.solution[0] for fit in fits)
     sds = [2 * float(np.sqrt(np.mean(fit.sds[0] ** 2))) for fit in fits]
     size, apart = float(np.linalg.norm(free)), float(np.linalg.norm(held - free))
@@ -167,7 +164,7 @@ def _window(frames: int) -> int:
 
 def _begins(path: PointPath) -> tuple[int, float]:
     """The first place from which on it is clearly away from the first; and how far it comes, m."""
-    gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
+    gone = np.linalg.norm(path.gone_m, axis=0)
     way_m = float(gone.max(initial=0.0))
     return _leaves(path, gone, way_m), way_m
 

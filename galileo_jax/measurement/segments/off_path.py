@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool
 from scipy import special
 
-from galileo_jax.numerics.least_squares import LinearFit, polynomial
+from galileo_jax.numerics.least_squares import LinearFit
 from galileo_jax.numerics.runs import stretches
 from galileo_jax.observation.observation import Observation, PointPath
 
@@ -66,7 +66,7 @@ def _first_run(path: PointPath, axes: int) -> np.ndarray | None:
     """
     for first in range(BESIDE, len(path) - BESIDE):
         near = path[first - BESIDE : first + MOST + BESIDE]
-        if not _is_off(near, _part(near, slice(BESIDE), 2), BESIDE, axes):
+        if not _is_off(near, near[:BESIDE].polynomial(2, near.times_s[0]), BESIDE, axes):
             continue
         for after in range(BESIDE + 1, len(near) - BESIDE + 1):
             off = _between(near, after, axes)
@@ -78,11 +78,12 @@ def _first_run(path: PointPath, axes: int) -> np.ndarray | None:
 def _between(near: PointPath, after: int, axes: int) -> np.ndarray | None:
     """Which places from `BESIDE` to before `after` lie beside a short path; None: it is one."""
     sides = slice(BESIDE), slice(after, after + BESIDE)
-    parabolas = [_part(near, side, 2) for side in sides]
+    first_s = near.times_s[0]
+    parabolas = [near[side].polynomial(2, first_s) for side in sides]
     if not _is_off(near, parabolas[1], after - 1, axes):
         return None
     both = np.r_[sides]
-    whole = _part(near, both, 3)
+    whole = near[both].polynomial(3, first_s)
     alone = sum(float(np.sum(fit.left**2)) for fit in parabolas)
     freedom = axes * sum(len(fit.design) - fit.design.shape[1] for fit in parabolas)
     more = axes * (len(both) - 4) - freedom
@@ -96,11 +97,6 @@ def _between(near: PointPath, after: int, axes: int) -> np.ndarray | None:
     if special.fdtrc(axes * len(rows), axes * (len(both) - 4), apart) > CHANCE:
         return None
     return rows[[_is_off(near, whole, int(row), axes) for row in rows]]
-
-
-def _part(path: PointPath, own: slice | np.ndarray, degree: int) -> LinearFit:
-    """A polynomial through some places of a short path, of the time since its first place."""
-    return polynomial(path.times_s[own] - path.times_s[0], path.place_m[:, own].T, degree)
 
 
 def _beside(path: PointPath, fit: LinearFit, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

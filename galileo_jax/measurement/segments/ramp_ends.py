@@ -64,10 +64,10 @@ def _tip_frame(clip: Clip, observation: Observation, i: int, half: Half | None) 
     if half is None or clip.ramp_angle_deg is None:
         return None
     length, height = half
-    seen = observation.path(i).frames
-    x, y = observation.position_m[i][:, seen]
+    path = observation.path(i)
+    seen, times, (x, y) = path.frames, path.times_s, path.place_m
     sd = np.sqrt(observation.covariance_m2[i, 1, 1, seen])
-    times, angle = observation.times_s[seen], math.radians(clip.ramp_angle_deg)
+    angle = math.radians(clip.ramp_angle_deg)
     on_table = x > FOOT * length + height * math.tan(angle / 2)
     before = np.ones(len(seen), bool) if i else x < -FOOT * length
     if before.sum() < FEWEST_FRAMES or on_table.sum() < FEWEST_FRAMES:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from galileo_jax.numerics.least_squares import least_squares, polynomial
+from galileo_jax.numerics.least_squares import least_squares
 from galileo_jax.observation.observation import Observation, PointPath
 
 LEAST, CLEAR = 1.5, 4.0  # factor of the velocity; standard deviations
@@ -55,19 +55,18 @@ class _Parabola(NamedTuple):
 
     velocity: np.ndarray
     acceleration: np.ndarray
+    places: int
+    left: float
     velocity_sd: float
     acceleration_sd: float
-    left: float
-    places: int
 
 
 def _parabola(path: PointPath, middle_s: float) -> _Parabola:
-    fit = polynomial(path.times_s - middle_s, path.place_m.T, 2)
-    variance = float(np.median(path.variance_m2))
-    left = float(np.sum(fit.left**2)) / ((len(path) - 3) * len(path.place_m) * variance)
-    sds = np.sqrt(variance * max(left, 1.0) * np.diagonal(fit.inverse))
-    (bend, velocity, _), (bend_sd, velocity_sd, _) = fit.solution, sds.tolist()
-    return _Parabola(velocity, 2 * bend, velocity_sd, 2 * bend_sd, left, len(path))
+    fit = path.polynomial(2, middle_s)
+    bend, velocity, _ = fit.solution
+    sds = np.sqrt(np.diagonal(fit.inverse)[1::-1]) * (1, 2)
+    known = _left_and_sds(path, fit.left, fit.solution.size, sds)
+    return _Parabola(velocity, 2 * bend, len(path), *known)
 
 
 def _from_rest(path: PointPath, middle_s: float) -> _Parabola:
@@ -83,16 +82,19 @@ def _from_rest(path: PointPath, middle_s: float) -> _Parabola:
     acceleration, moved_s = fits[best].solution[1], since[best]
     size, gone_s = float(np.linalg.norm(acceleration)), middle_s - starts[best]
     slopes = np.column_stack([np.ones_like(moved_s), moved_s**2 / 2, -size * moved_s])
-    inverse = np.linalg.pinv(slopes.T @ slopes)
+    inverse, of_velocity = np.linalg.pinv(slopes.T @ slopes), np.array([0.0, gone_s, -size])
+    sds = np.sqrt([of_velocity @ inverse @ of_velocity, inverse[1, 1]])
+    known = _left_and_sds(path, fits[best].left, fits[best].solution.size + 1, sds)
+    return _Parabola(acceleration * gone_s, acceleration, len(path), *known)
+
+
+def _left_and_sds(
+    path: PointPath, left: np.ndarray, num_unknowns: int, sds: np.ndarray
+) -> tuple[float, ...]:
+    """The variance left over the stated one, and what `sds` for places of sd 1 are with it."""
     variance = float(np.median(path.variance_m2))
-    count = (len(path) - 2) * place.shape[1] - 1
-    left = float(np.sum(fits[best].left ** 2)) / (count * variance)
-    of_velocity = np.array([0.0, gone_s, -size])
-    scale = variance * max(left, 1.0)
-    velocity_sd = float(np.sqrt(scale * of_velocity @ inverse @ of_velocity))
-    acceleration_sd = float(np.sqrt(scale * inverse[1, 1]))
-    velocity = acceleration * gone_s
-    return _Parabola(velocity, acceleration, velocity_sd, acceleration_sd, left, len(path))
+    over = float(np.sum(left**2)) / ((left.size - num_unknowns) * variance)
+    return over, *(np.sqrt(variance * max(over, 1.0)) * sds).tolist()
 
 
 def _kinked_left(path: PointPath, variance_m2: float) -> float:

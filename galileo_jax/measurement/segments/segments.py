@@ -145,13 +145,12 @@ class _Kept:
 
 def _of_one(clip: Clip, kept: _Kept) -> _Kept:
     """Of one object that slides down a board, falls, flies or swings."""
-    scenario = SCENARIOS[clip.scenario]
-    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    scenario, is_free, falls = SCENARIOS[clip.scenario], _is_free(clip), clip.scenario == "fall"
     is_let_go = (
         scenario.has_ramp and not clip.starts_moving and "start_velocity" not in scenario.laws
     )
-    is_dropped = is_free and clip.scenario == "fall" and not clip.objects[0].first_frame
-    if is_let_go or is_dropped:
+    may_be_held = is_free and not clip.objects[0].first_frame
+    if is_let_go or (may_be_held and falls):
         first, last = rest.placed_frames(kept.observation)
         kept = kept.cut("before", first, PLACED).cut("after", last, TAKEN)
     if clip.scenario in SWINGS:
@@ -165,23 +164,23 @@ def _of_one(clip: Clip, kept: _Kept) -> _Kept:
         # A short push is a blow, too, and no end.
         pushed = handling.pushed_frame(kept.observation, least_m_s2=down_m_s2 or 0.0)
         kept = kept.cut("before", pushed, PUSHED)
-    if is_free and not clip.objects[0].first_frame:
+    if may_be_held:
         kept = kept.cut("before", _first_free(clip, kept.observation), HELD)
     kept = kept.cut("after", *_end_of_one(clip, kept.observation))
-    if is_free and not clip.objects[0].first_frame:
-        rest_belongs = clip.scenario == "fall"
-        is_told = rest_belongs and clip.is_scale_known
-        most_m_s2 = FREELY * clip.gravity if is_told else 0.0
-        free = handling.thrown_frame(kept.observation, rest_belongs, most_m_s2)
-        if free is None and rest_belongs:
+    if may_be_held:
+        most_m_s2 = FREELY * clip.gravity if falls and clip.is_scale_known else 0.0
+        free = handling.thrown_frame(kept.observation, rest_belongs=falls, most_m_s2=most_m_s2)
+        if free is None and falls:
             free = handling.shaken_frame(kept.observation)
         return kept.cut("before", free, HELD)
-    is_hand_asked = is_let_go and scenario.angle_deg != 0 and pushed is None
-    return (
-        kept.cut("before", handling.hand_frame(kept.observation, down_m_s2 or 0.0), HELD)
-        if is_hand_asked
-        else kept
-    )
+    if is_let_go and scenario.angle_deg != 0 and pushed is None:
+        return kept.cut("before", handling.hand_frame(kept.observation, down_m_s2 or 0.0), HELD)
+    return kept
+
+
+def _is_free(clip: Clip) -> bool:
+    """Whether object 1 falls or flies, with nothing that it could meet."""
+    return clip.scenario in ("fall", "flight") and not clip.has_floor
 
 
 def _first_free(clip: Clip, observation: Observation) -> int | None:
@@ -189,7 +188,7 @@ def _first_free(clip: Clip, observation: Observation) -> int | None:
     last = _blow_frame(clip, observation)
     if last is None or not handling.comes_free(observation, last):
         return None
-    seen = np.flatnonzero(observation.mask[0])
+    seen = observation.path().frames
     return int(seen[int(np.searchsorted(seen, last)) + 1 + blow.SMEARED])
 
 
@@ -211,20 +210,20 @@ def _down_m_s2(clip: Clip, observation: Observation) -> float | None:
 def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
     """The last frame before the motion of one object ends, and why; None where it goes on."""
     is_board, is_swing = SCENARIOS[clip.scenario].has_ramp, clip.scenario in SWINGS
-    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    may_be_stopped = is_board or _is_free(clip)
     ends: list[tuple[int | None, str]] = []
     if clip.scenario == "toss" and clip.track is not None:
         poses = read_poses_csv(clip.track, clip.track_up)
         ends.append((last_free_frame(poses, clip.objects[0].size_m), LANDED))
-    if is_board or is_free:
+    if may_be_stopped:
         stop = blow.arrest_frame(observation)
         goes_on = stop is not None and blow.goes_on(observation, stop)
         ends.append((stop, STRUCK if goes_on else STOPPED))
     if is_swing:
         ends.append((rest.standstill_frame(observation), STOPPED))
-    if SCENARIOS[clip.scenario].has_ramp:
+    if is_board:
         ends.append((end_of_slope(observation), SLOPE_ENDS))
-    if is_board or is_free or is_swing:
+    if may_be_stopped or is_swing:
         ends.append((_blow_frame(clip, observation), STRUCK))
     found = [(frame, why) for frame, why in ends if frame is not None]
     if not found:

@@ -152,9 +152,8 @@ class _Way(NamedTuple):
 
 def _first_half(observation: Observation, fewest: int = FEWEST) -> _Way | None:
     """Of object 1; None where it is seen in fewer places."""
-    seen = np.flatnonzero(observation.mask[0])
-    place_m = observation.position_m[0][:, seen]
-    gone = place_m - place_m[:, :1]
+    path = observation.path()
+    seen, gone = path.frames, path.gone_m
     distance = np.linalg.norm(gone, axis=0)
     if len(seen) < fewest or not distance.max() > 0:
         return None
@@ -170,5 +169,5 @@ def _first_half(observation: Observation, fewest: int = FEWEST) -> _Way | None:
     sign = -1.0 if way[back] < -CLEAR * math.hypot(sd[0], sd[back]) else 1.0
     way, end = sign * way, back if sign < 0 else farthest
     early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way[end]))))
-    times = observation.times_s[seen] - observation.times_s[seen[0]]
+    times = path.times_s - path.times_s[0]
     return _Way(times[early], way[early], sd[early], sign)
