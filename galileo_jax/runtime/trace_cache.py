@@ -12,7 +12,6 @@ import contextlib
 import functools
 import hashlib
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -55,7 +54,7 @@ class TraceCached:
         functools.update_wrapper(self, function)
         self._function, self._num_static = function, num_static
         self._jitted = jax.jit(function, static_argnums=tuple(range(num_static)))
-        self._programs: OrderedDict[Any, Callable[..., Any]] = OrderedDict()
+        self._programs = functools.lru_cache(MOST_PROGRAMS)(self._program)
         self._lock = threading.Lock()
 
     def __call__(self, *args: Any) -> Any:
@@ -94,18 +93,8 @@ class TraceCached:
 
     def _held(self, key: Any, many: int | None = None) -> Callable[..., Any]:
         """The program of a key; of `many` calls at once."""
-        key = (*key, many)
-        program = self._programs.get(key)
-        if program is None:
-            with self._lock:  # parts of a batch come on threads: one of them traces
-                program = self._programs.get(key) or self._program(key)
-                self._programs[key] = program
-                while len(self._programs) > MOST_PROGRAMS:
-                    self._programs.popitem(last=False)
-        else:
-            with contextlib.suppress(KeyError):  # another thread has just dropped it
-                self._programs.move_to_end(key)
-        return program
+        with self._lock:  # parts of a batch come on threads: one of them traces
+            return self._programs((*key, many))
 
     def _program(self, key: Any) -> Callable[..., Any]:
         """Reads the program, or traces and writes it; maps leaves to the function's result."""
