@@ -37,7 +37,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.known_names import check_known, option_of
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import World, Worlds, fit_worlds
@@ -176,7 +176,7 @@ def _check(options: FitOptions) -> None:
     ignored, why = ignored_options(options.method, options.preset)
     for name in ignored:
         if getattr(options, name) != getattr(FitOptions(), name):
-            raise InputError(f"--{name.replace('_', '-')}: {why}")
+            raise InputError(f"{option_of(name)}: {why}")
     if options.method == "mh":
         from galileo_jax.inference.samplers.sampler import SAMPLERS
 

@@ -15,6 +15,7 @@ from galileo_jax.clip.look import FALL_M_S2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import option_of
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
@@ -116,7 +117,7 @@ def _given(answers: Answers) -> Iterator[str]:
 def _option(key: str, value: Any) -> str:
     """An answer by the yaml's key as an option of a call."""
     shown = f"{value:g}" if isinstance(value, float) else value
-    return f"--{key.removesuffix('_deg').replace('_', '-')} {shown}"
+    return f"{option_of(key.removesuffix('_deg'))} {shown}"
 
 
 def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import check_folder, write_json, write_text
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.known_names import check_known, option_of
 from galileo_jax.runtime.precision import in_float64
 
 PRESETS = ("thesis", "galileo")
@@ -91,8 +91,7 @@ def train(
     for name, least in LEAST.items():
         value = overrides[name]
         if value is not None and not (isinstance(value, int) and value >= least):
-            option = f"--{name.replace('_', '-')}"
-            raise InputError(f"{option}: '{value}' is not a whole number, {least} or more")
+            raise InputError(f"{option_of(name)}: '{value}' is not a whole number, {least} or more")
     out = Path(out)
     check_folder(out)
     path = Path(config) if config else config_path(f"train_{preset}.yaml")
