@@ -22,7 +22,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.report.track_chart import track_chart
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.tracking.track import Track as PixelTrack
@@ -96,14 +96,12 @@ class Track:
           InputError: the file cannot be written.
         """
         path = Path(path)
-        try:
+        with one_line_of(path):
             if self.measurement is not None:
                 write_observation_csv(path, self.measurement.whole)
             else:
                 assert self.pixels is not None  # a csv track in px needs its scale to load
                 write_pixel_csv(path, self.pixels)
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from error
         return path
 
     def save_tables(self, folder: str | Path) -> tuple[Path, ...]:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 
 _unfinished: set[Path] = set()
 """Temporary files that are being written, by any thread."""
@@ -54,10 +54,8 @@ def writing_into(out: Path) -> Iterator[None]:
       InputError: it is a file, or it cannot be written to.
     """
     check_folder(out)
-    try:
+    with one_line_of(f"--out: {out}"):
         yield
-    except OSError as error:
-        raise InputError(f"--out: {out}: {error.strerror or error}") from error
 
 
 def check_folder(out: Path) -> None:
