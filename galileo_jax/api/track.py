@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from galileo_jax.api.clips import ClipLike, as_clip, as_list
 from galileo_jax.api.precompile import Compile, precompiling
 from galileo_jax.clip.checks import check_same_objects, check_scale
@@ -73,10 +71,9 @@ class Track:
             columns: dict[str, Any] = {"object": item.name}
             if self.measurement is not None:
                 seen = self.measurement.whole
-                sd = np.sqrt(np.diagonal(seen.covariance_m2[k], axis1=0, axis2=1))
                 columns |= {"time_s": seen.times_s}
                 columns |= {f"{axis}_m": seen.position_m[k, i] for i, axis in enumerate("xy")}
-                columns |= {f"sd_{axis}_m": sd[:, i] for i, axis in enumerate("xy")}
+                columns |= {f"sd_{axis}_m": seen.sd_m[k, i] for i, axis in enumerate("xy")}
                 columns |= {"is_visible": seen.mask[k]}
             if (px := self.pixels) is not None:
                 columns |= {"time_s": px.times_s}
