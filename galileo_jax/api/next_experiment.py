@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import __version__
+from galileo_jax.api.clips import as_list
 from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose
 from galileo_jax.api.fit_result import load_run
 from galileo_jax.api.track import Track, tracks_of
@@ -163,9 +164,7 @@ def _loaded(
     found: Found | Sequence[Found],
 ) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
     """The first clip, the joint problem, the hypotheses and the clips' names."""
-    given = [found] if isinstance(found, str | Path | Diagnosis) else list(found)
-    if not given:
-        raise InputError("no run given; at least one expected")
+    given = as_list(found, "no run given; at least one expected")
     one = given[0]
     if len(given) > 1 or not (isinstance(one, Diagnosis) or _diagnosis_folder(one)):
         with progress.part(0.0, DIAGNOSED):
