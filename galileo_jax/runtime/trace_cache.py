@@ -65,7 +65,7 @@ class TraceCached:
         group = call_merging.current()
         if group is not None:
             return group.call(self, args)
-        return self._held(key)([_array(leaf) for leaf in leaves])
+        return self._held(key)(leaves)
 
     def key_of(self, args: tuple[Any, ...]) -> Any:
         """What calls have in common that can be made together."""
@@ -76,7 +76,7 @@ class TraceCached:
         split = [self._split(args) for args in calls]
         key = split[0][1]
         if len(calls) == 1:
-            return [self._held(key)([_array(leaf) for leaf in split[0][0]])]
+            return [self._held(key)(split[0][0])]
         # Few sizes: every one of them costs a compilation. The first call fills what is empty.
         many = 1 << (len(calls) - 1).bit_length()
         rows = [leaves for leaves, _ in split] + [split[0][0]] * (many - len(calls))
@@ -86,8 +86,9 @@ class TraceCached:
     def _split(self, args: tuple[Any, ...]) -> tuple[list[Any], Any]:
         """The arrays of a call, and what its program is found by."""
         static, traced = args[: self._num_static], args[self._num_static :]
-        leaves, tree = jax.tree.flatten(traced)
-        shapes = tuple((np.shape(leaf), _dtype(leaf)) for leaf in leaves)
+        given, tree = jax.tree.flatten(traced)
+        leaves = [leaf if isinstance(leaf, jax.Array) else np.asarray(leaf) for leaf in given]
+        shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
         # The setting may be the calling thread's own; dtypes of constants follow it.
         return leaves, (static, tree, shapes, _setting("jax_enable_x64"))
 
@@ -120,14 +121,6 @@ class TraceCached:
 
         call.__name__ = self._function.__name__  # for JAX's logs and profiles
         return jax.jit(call)
-
-
-def _array(leaf: Any) -> Any:
-    return leaf if isinstance(leaf, jax.Array) else np.asarray(leaf)
-
-
-def _dtype(leaf: Any) -> Any:
-    return leaf.dtype if hasattr(leaf, "dtype") else np.asarray(leaf).dtype
 
 
 def _folder() -> Path | None:
