@@ -57,10 +57,7 @@ class Motion:
 
 
 def motions_at(
-    trials: JointProblem,
-    clips: Sequence[Clip],
-    theta: np.ndarray,
-    best: np.ndarray | None = None,
+    trials: JointProblem, clips: Sequence[Clip], theta: np.ndarray, best: np.ndarray | None = None
 ) -> tuple[Motion, ...]:
     """The motion of every clip with parameters `theta`, in their units, noise scales last.
 

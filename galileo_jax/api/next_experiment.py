@@ -15,13 +15,7 @@ from galileo_jax.api.fit_result import load_run
 from galileo_jax.api.track import Track, tracks_of
 from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.clip.schema import Clip
-from galileo_jax.experiment.choose import (
-    Expected,
-    best_first,
-    default_can,
-    expect,
-    sentence_of,
-)
+from galileo_jax.experiment.choose import Expected, best_first, default_can, expect, sentence_of
 from galileo_jax.experiment.hypothesis_probabilities import FILE, Beliefs, beliefs_of, read_beliefs
 from galileo_jax.experiment.settings import NUMBERS, check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
@@ -160,9 +154,7 @@ def next_experiment(
     return NextExperiment(rows, about, beliefs.by_name, document)
 
 
-def _loaded(
-    found: Found | Sequence[Found],
-) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
+def _loaded(found: Found | Sequence[Found]) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
     """The first clip, the joint problem, the hypotheses and the clips' names."""
     given = as_list(found, "no run given; at least one expected")
     one = given[0]

@@ -72,11 +72,7 @@ class Together:
                 self._make_if_all_wait()
 
     def call(self, program: Any, args: tuple[Any, ...]) -> Any:
-        """The program's result, once all members wait for theirs.
-
-        Raises:
-          Cancelled: the group was closed.
-        """
+        """The program's result, once all members wait for theirs; `Cancelled` once it is closed."""
         own = _Call(program, args, jax.config.read("jax_enable_x64"), Future())
         with self._lock:
             if self._is_closed:

@@ -1,4 +1,4 @@
-"""Refusing a name that there is not, with the nearest one that there is."""
+"""Names of options; refusing a name that there is not, with the nearest one that there is."""
 
 import difflib
 from collections.abc import Collection, Iterable
