@@ -55,7 +55,7 @@ class TraceCached:
         self._function, self._num_static = function, num_static
         self._jitted = jax.jit(function, static_argnums=tuple(range(num_static)))
         self._programs = functools.lru_cache(MOST_PROGRAMS)(self._program)
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
 
     def __call__(self, *args: Any) -> Any:
         """Runs the function."""
