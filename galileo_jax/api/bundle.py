@@ -33,7 +33,7 @@ from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.report.provenance import versions
 from galileo_jax.results.impersonal import Impersonal, impersonal
 from galileo_jax.runtime.atomic_write import finite, replacing
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 
 if TYPE_CHECKING:
     from galileo_jax.api.explain import Explanation
@@ -166,12 +166,13 @@ def _written(
     machine = f"{platform.system()} {platform.machine()}"
     files["versions.json"] = _json({**versions(), "operating system": machine})
     files = {"README.txt": _read_me(files), **files}
-    try:
-        with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for name, data in files.items():
-                archive.writestr(zipfile.ZipInfo(name, MADE), data, zipfile.ZIP_DEFLATED)
-    except OSError as error:
-        raise InputError(f"{path}: the bundle: {error.strerror or error}") from error
+    with (
+        one_line_of(f"{path}: the bundle"),
+        replacing(path) as temporary,
+        zipfile.ZipFile(temporary, "w") as archive,
+    ):
+        for name, data in files.items():
+            archive.writestr(zipfile.ZipInfo(name, MADE), data, zipfile.ZIP_DEFLATED)
     return Bundle(path, tuple(files))
 
 

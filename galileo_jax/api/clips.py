@@ -68,9 +68,9 @@ def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
         raise InputError(f"{key}: {error.errors()[0]['msg']}") from None
 
 
-def as_list(given: Any) -> list[Any]:
-    """One clip or several, as a list; a path or a mapping is one. Refuses none."""
+def as_list(given: Any, none: str = "no clip given; at least one expected") -> list[Any]:
+    """One clip or several, as a list; a path or a mapping is one. Refuses none, in these words."""
     found = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     if not found:
-        raise InputError("no clip given; at least one expected")
+        raise InputError(none)
     return found

@@ -290,9 +290,9 @@ def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
 def answered_clips(
     clips: Sequence[ClipLike],
     said: Mapping[str, Any],
-    ask: Callable[[Understood, dict[str, Any]], dict[str, Any]] = lambda _, said: said,
+    ask: Callable[[Understood], Understood] = lambda known: known,
     look_at: Callable[[ClipLike, Mapping[str, Any]], Clip | Understood] = understood,
-) -> tuple[list[Clip], list[tuple[Understood, dict[str, Any]]]]:
+) -> tuple[list[Clip], list[Understood]]:
     """The checked clips, and those whose yaml leaves something open with what was answered.
 
     What is answered of one trial holds of the next, but where its things are. Nothing is written.
@@ -300,7 +300,7 @@ def answered_clips(
     Args:
       clips: the trials.
       said: of all of them, by keys of the yaml.
-      ask: given what is understood of a clip, and the answers so far, returns all answers.
+      ask: returns what is understood of a clip with all answers.
       look_at: `understood`, or it with a memory or a display of its progress.
 
     Raises:
@@ -309,17 +309,16 @@ def answered_clips(
     if (scenario := said.get("scenario")) is not None:
         check_known("scenario", "scenario", scenario, SCENARIOS)
     found: list[Clip] = []
-    asked: list[tuple[Understood, dict[str, Any]]] = []
-    answers = dict(said)
+    asked: list[Understood] = []
+    answers = said
     for clip in clips:
         known = look_at(clip, said)
         if isinstance(known, Clip):
             found.append(known)
             continue
-        answers = ask(known, answers)
-        found.append(clip_of(known, answers, str(clip)))
-        asked.append((known, answers))
-        answers = {key: v for key, v in answers.items() if key != "points" or key in said}
+        asked.append(ask(known.with_answers(answers)))
+        found.append(clip_of(asked[-1], str(clip)))
+        answers = {k: v for k, v in asked[-1].answers.items() if k != "points" or k in said}
     return found, asked
 
 

@@ -155,13 +155,12 @@ def _track_table(
     parts = []
     for clip, observed in tracks.items():
         for k, name in enumerate(observed.names):
-            covariance = observed.covariance_m2[k]
-            sd = np.sqrt(np.diagonal(covariance)).T
+            sd = observed.sd_m[k]
             part = pd.DataFrame({"clip": clip, "object": name, "time_s": observed.times_s})
             known = len(part.columns)
             part["x_m"], part["y_m"], *z = observed.position_m[k]
             part["sd_x_m"], part["sd_y_m"] = sd[:2]
-            part["correlation"] = covariance[0, 1] / (sd[0] * sd[1])
+            part["correlation"] = observed.covariance_m2[k, 0, 1] / (sd[0] * sd[1])
             if z:
                 part["z_m"], part["sd_z_m"] = z[0], sd[2]
             part.loc[~observed.mask[k], part.columns[known:]] = np.nan

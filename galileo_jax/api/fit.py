@@ -37,14 +37,13 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.known_names import check_known, option_of
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.fit import best_fit
 from galileo_jax.search.imperfect import World, Worlds, fit_worlds
 
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
-THESIS_CHAINS = 16
 TRACKED, FITTED = 0.4, 0.6  # shares of the work, for progress
 OFF_THE_PLANE = "an object has a z_m, which motion in a plane ignores; see --motion free"
 
@@ -176,7 +175,7 @@ def _check(options: FitOptions) -> None:
     ignored, why = ignored_options(options.method, options.preset)
     for name in ignored:
         if getattr(options, name) != getattr(FitOptions(), name):
-            raise InputError(f"--{name.replace('_', '-')}: {why}")
+            raise InputError(f"{option_of(name)}: {why}")
     if options.method == "mh":
         from galileo_jax.inference.samplers.sampler import SAMPLERS
 
@@ -277,13 +276,12 @@ def _notes(options: FitOptions, clips: Sequence[Clip], found: Found) -> dict[str
     notes: dict[str, Any] = {"motion": options.motion}
     said: list[str | None] = []
     if found.gradient is not None and options.method != "mh":
-        draws = found.posterior.flat()
-        said = [two_solutions(found.problem, found.gradient, draws)]
+        said.append(two_solutions(found.problem, found.gradient, found.posterior.flat()))
         said.append(uncertain_width(found.posterior))
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         said.append(OFF_THE_PLANE)
-    if told := [line for line in said if line is not None]:
-        notes["warnings"] = told
+    if warnings := [line for line in said if line is not None]:
+        notes["warnings"] = warnings
     if options.free:
         notes["free"] = sorted(options.free)
     return notes | {"discrepancy_asked": options.discrepancy}
@@ -294,11 +292,9 @@ def _gradient(
 ) -> tuple[Worlds, np.ndarray | None, dict[str, Any]]:
     """What the clips may show, where chains start in z (None: dispersed round it), and notes."""
     if options.init == "cnn":
-        from galileo_jax.inference.metropolis import NUM_CHAINS
         from galileo_jax.neural.start import start_from_network
 
-        chains = options.chains or NUM_CHAINS
-        start = start_from_network(fitter.trials, options.seed, chains)
+        start = start_from_network(fitter.trials, options.seed, _num_chains(options))
         return Worlds(World(fitter.trials, start.fit), start.fit), start.z, start.notes
     shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
 
@@ -334,7 +330,7 @@ def _by_chains(
     checkpoint: Path | None,
 ) -> Found:
     """Samples from the gradient fit on; resumes what an interruption left in the checkpoint."""
-    from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
+    from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Progress, Settings
 
     settings = Settings(
@@ -355,7 +351,7 @@ def _by_chains(
         options.seed,
         sampler=options.sampler,
         settings=settings,
-        num_chains=options.chains or NUM_CHAINS,
+        num_chains=_num_chains(options),
         starts=starts,
         checkpoint=checkpoint,
         identity=checkpoint_identity(measured, found.problem, options),
@@ -377,20 +373,24 @@ def checkpoint_identity(
     measured: Sequence[Measurement], problem: JointProblem, options: FitOptions
 ) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
+    chosen = (options.sampler, options.seed, options.effects, options.free, options.init)
+    chosen += (_num_chains(options),)
+    return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
+
+
+def _num_chains(options: FitOptions) -> int:
     from galileo_jax.inference.metropolis import NUM_CHAINS
 
-    chains = options.chains or NUM_CHAINS
-    chosen = (options.sampler, options.seed, options.effects, options.free, options.init, chains)
-    return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
+    return options.chains or NUM_CHAINS
 
 
 def _by_thesis(problem: JointProblem, options: FitOptions) -> Found:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
-    from galileo_jax.thesis.sampler import thesis_posterior
+    from galileo_jax.thesis.sampler import NUM_CHAINS, thesis_posterior
 
     chosen = {name: getattr(options, name) for name in OF_THESIS}
     posterior, best = thesis_posterior(
-        problem, options.seed, **chosen, num_chains=options.chains or THESIS_CHAINS
+        problem, options.seed, **chosen, num_chains=options.chains or NUM_CHAINS
     )
     middle = problem.theta(np.zeros(len(problem.names)))
     theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax import __version__
-from galileo_jax.clip.load import load_clip
+from galileo_jax.api.clips import as_clip, as_list
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.toss.fit import TossSolution, fit_poses
@@ -88,10 +88,8 @@ def fit_tosses(
     """
     if not 0.02 <= window <= 0.2:
         raise InputError(f"window: {window:g} s is outside [0.02, 0.2]")
-    given = [clips] if isinstance(clips, str | Path | Clip) else list(clips)
-    loaded = [one if isinstance(one, Clip) else load_clip(one) for one in given]
-    if not loaded:
-        raise InputError("clips: none given; one toss or more expected")
+    given = as_list(clips, "clips: none given; one toss or more expected")
+    loaded = [as_clip(one) for one in given]
     edges = [_edge_m(clip) for clip in loaded]
     for clip, edge in zip(loaded, edges, strict=True):
         if edge != edges[0]:

@@ -50,7 +50,7 @@ class Look:
             return self.seen.yaml
         from galileo_jax.api.proposed_clip import yaml_of
 
-        return yaml_of(self.understood, {}) if self.understood.scenario({}) else ""
+        return yaml_of(self.understood) if self.understood.scenario else ""
 
     def summary(self) -> str:
         """Lines to read: columns, time, gaps, what moves, the likely scenario; a yaml."""
@@ -111,7 +111,7 @@ def _of_film(film: Look) -> list[str]:
     from galileo_jax.api.understand import listed_things, sentence_of
 
     known = film.understood
-    lines = [f"{film.path.name}: {film.film}", sentence_of(known, {})]
+    lines = [f"{film.path.name}: {film.film}", sentence_of(known)]
     return [*lines, *(f"  {one}" for one in listed_things(known))]
 
 

@@ -57,10 +57,7 @@ class Motion:
 
 
 def motions_at(
-    trials: JointProblem,
-    clips: Sequence[Clip],
-    theta: np.ndarray,
-    best: np.ndarray | None = None,
+    trials: JointProblem, clips: Sequence[Clip], theta: np.ndarray, best: np.ndarray | None = None
 ) -> tuple[Motion, ...]:
     """The motion of every clip with parameters `theta`, in their units, noise scales last.
 
@@ -95,7 +92,6 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
     shown = seen.mask[:, None]
     measured = np.where(shown, seen.position_m, np.nan)
     offset = seen.offset_m(fitted)[..., None]
-    variance = np.stack([seen.covariance_m2[:, axis, axis] for axis in (0, 1)], axis=1)
     turned = pitch(np.nan_to_num(predicted.transpose(2, 0, 1)), scene.surroundings).T
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
     sign = 1.0 if clip.direction == "right" else -1.0
@@ -106,7 +102,7 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
         seen.times_s,
         seen.mask,
         measured,
-        np.sqrt(variance),
+        seen.sd_m[:, :2],
         predicted + offset,
         np.where(shown, white, np.nan),
         _in_pixels(clip, measured),

@@ -9,18 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import __version__
+from galileo_jax.api.clips import as_list
 from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose
 from galileo_jax.api.fit_result import load_run
 from galileo_jax.api.track import Track, tracks_of
 from galileo_jax.assembly.build_problem import with_library
 from galileo_jax.clip.schema import Clip
-from galileo_jax.experiment.choose import (
-    Expected,
-    best_first,
-    default_can,
-    expect,
-    sentence_of,
-)
+from galileo_jax.experiment.choose import Expected, best_first, default_can, expect, sentence_of
 from galileo_jax.experiment.hypothesis_probabilities import FILE, Beliefs, beliefs_of, read_beliefs
 from galileo_jax.experiment.settings import NUMBERS, check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
@@ -159,13 +154,9 @@ def next_experiment(
     return NextExperiment(rows, about, beliefs.by_name, document)
 
 
-def _loaded(
-    found: Found | Sequence[Found],
-) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
+def _loaded(found: Found | Sequence[Found]) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
     """The first clip, the joint problem, the hypotheses and the clips' names."""
-    given = [found] if isinstance(found, str | Path | Diagnosis) else list(found)
-    if not given:
-        raise InputError("no run given; at least one expected")
+    given = as_list(found, "no run given; at least one expected")
     one = given[0]
     if len(given) > 1 or not (isinstance(one, Diagnosis) or _diagnosis_folder(one)):
         with progress.part(0.0, DIAGNOSED):

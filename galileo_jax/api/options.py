@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
-from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.known_names import check_known, option_of
 
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
@@ -27,8 +27,8 @@ def check_choices(options: Any) -> None:
     """Raises `InputError` where an option, whose type lists what there is, has another value."""
     for one in fields(options):
         if get_origin(one.type) is Literal:
-            option = f"--{one.name.replace('_', '-')}"
-            check_known(option, one.name, getattr(options, one.name), get_args(one.type))
+            value = getattr(options, one.name)
+            check_known(option_of(one.name), one.name, value, get_args(one.type))
 
 
 @dataclass(frozen=True)

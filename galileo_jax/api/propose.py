@@ -168,7 +168,8 @@ def _size(mover: Mover, turned_rad: float = 0.0) -> Point:
 def _turn(clip: Clip) -> float:
     """How an object on the ramp stands in the picture, clockwise, rad."""
     assert clip.ramp_angle_deg is not None  # measured
-    return math.radians(clip.ramp_angle_deg) * (1.0 if clip.direction == "right" else -1.0)
+    angle = math.radians(clip.ramp_angle_deg)
+    return angle if clip.direction == "right" else -angle
 
 
 def _with_height(clip: Clip, before_px: float, now_px: float) -> Clip:
@@ -182,18 +183,15 @@ def _with_height(clip: Clip, before_px: float, now_px: float) -> Clip:
 
 def _line(clip: Clip, size: Point) -> tuple[tuple[float, float, float, float], Point | None]:
     """The ramp's surface below the first object, from above it down to the foot, px."""
-    assert clip.ramp_angle_deg is not None and clip.frame_size_px is not None  # measured
-    angle = math.radians(clip.ramp_angle_deg)
-    along = 1.0 if clip.direction == "right" else -1.0
-    down = np.array([along * math.cos(angle), math.sin(angle)])
-    into = np.array([-along * math.sin(angle), math.cos(angle)])  # from the object into the ramp
+    right, into = rotation(_turn(clip)).T  # along the ramp, and from the object into it
+    down = right if clip.direction == "right" else -right
     start = np.asarray(clip.objects[0].point_px) + into * size[1] / 2
-    width, height = clip.frame_size_px
     if clip.origin_px is not None:
         foot = np.asarray(clip.origin_px)
-        upper = foot - down * (down @ (foot - start) + size[0])
-        return _rounded(upper, foot), (round(float(foot[0]), 1), round(float(foot[1]), 1))
-    reach = 0.45 * min(width, height) / max(abs(down))
+        line = _rounded(foot - down * (down @ (foot - start) + size[0]), foot)
+        return line, line[2:]
+    assert clip.frame_size_px is not None  # of a video
+    reach = 0.45 * min(clip.frame_size_px) / max(abs(down))
     return _rounded(start - down * 0.2 * reach, start + down * reach), None
 
 

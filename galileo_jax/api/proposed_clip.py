@@ -2,39 +2,38 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from galileo_jax.api.questions import assumed, check_answered
-from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
+from galileo_jax.api.understand import USUAL_FPS, Understood
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
 from galileo_jax.clip.scenarios import Scenario
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.runtime.atomic_write import write_text
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 
 FOOT_SD_PX = 3.0  # of a foot that was found, not marked
 
 
-def clip_of(known: Understood, answers: Answers, source: str | None = None) -> Clip:
+def clip_of(known: Understood, source: str | None = None) -> Clip:
     """The checked clip; what a person said goes before what the yaml declares.
 
     `source`: what it is called in results; None: its file. Raises `InputError`, one line with all
     that only a person can know and is missing, or with what was said and is wrong.
     """
-    _check_slides(known, answers)
-    check_answered(known, answers)
-    content = known.declared or yaml.safe_load(yaml_of(known, answers))
-    said = {key: value for key, value in answers.items() if key != "points"}
-    if known.declared:
-        content = _completed(known, answers) | said
-        if known.has_objects and "points" in answers:
-            objects = placed(known.declared["objects"], answers["points"], known.yaml_path)
-            content["objects"] = objects
+    _check_slides(known)
+    check_answered(known)
+    said = {key: value for key, value in known.answers.items() if key != "points"}
+    content = _completed(known) | said if known.declared else yaml.safe_load(yaml_of(known))
+    if known.has_objects and "points" in known.answers:
+        objects = placed(known.declared["objects"], known.answers["points"], known.yaml_path)
+        content["objects"] = objects
     clip = with_unused(check_clip(known.yaml_path, content, overridden=frozenset(said)))
     return clip.model_copy(update={"source": source or str(known.source)})
 
@@ -56,12 +55,12 @@ def placed(
     return [{**one, "point_px": list(at)} for one, at in zip(known, points, strict=True)]
 
 
-def _check_slides(known: Understood, answers: Answers) -> None:
+def _check_slides(known: Understood) -> None:
     """Refuses a motion that is said to be a slide, and goes to and fro."""
-    scenario = known.scenario(answers)
+    scenario = known.scenario
     if scenario is None or known.has_objects or scenario.line not in ("slope", "level"):
         return
-    likely = known.likely(answers)
+    likely = known.likely
     if likely is None or likely.swings < SWINGS:
         return
     what, which = "its path", ""
@@ -74,67 +73,65 @@ def _check_slides(known: Understood, answers: Answers) -> None:
     )
 
 
-def yaml_of(known: Understood, answers: Answers) -> str:
+def yaml_of(known: Understood) -> str:
     """The yaml to be written beside the file, where there is none."""
-    scenario = known.scenario(answers)
+    scenario = known.scenario
     if scenario is None:
         raise InputError(f"{known.source}: scenario: missing")
     if known.is_film:
-        return yaml_text(_of_film(known, scenario, answers))
+        return yaml_text(_of_film(known, scenario))
     table = known.look.table
     assert table is not None  # of a table
-    motion, floor = table.motion(1), _has_floor(known, scenario, answers)
+    motion, floor = table.motion(1), _has_floor(known, scenario)
     text = proposed_yaml(known.source, motion, scenario.name, None, len(table.starts), floor)
-    said = {key: value for key, value in answers.items() if key not in ("points", "scenario")}
-    if needs_angle(scenario):
+    said = {key: value for key, value in known.answers.items() if key not in ("points", "scenario")}
+    if scenario.is_sloped:
         said.setdefault("ramp_angle_deg", None)
-    for key, one in assumed(known, answers).items():
+    for key, one in assumed(known).items():
         said[key] = f"{one.default}  # {one.why}"
     return _filled(text, said)
 
 
-def write_yaml(known: Understood, answers: Answers) -> Path | None:
+def write_yaml(known: Understood) -> Path | None:
     """Writes the yaml beside the file; None where there is one, which stays as it is."""
     if known.declared or known.yaml_path.exists():
         return None
-    try:
-        write_text(known.yaml_path, yaml_of(known, answers))
-    except OSError as error:
-        raise InputError(f"{known.yaml_path}: {error.strerror or error}") from error
+    with one_line_of(known.yaml_path):
+        write_text(known.yaml_path, yaml_of(known))
     return known.yaml_path
 
 
-def _completed(known: Understood, answers: Answers) -> dict[str, Any]:
+def _completed(known: Understood) -> dict[str, Any]:
     """What an incomplete yaml declares, and what it lacks."""
     content = dict(known.declared)
     plain = {key: content[key] for key in ("scenario", "fps") if key in content}
-    made = yaml.safe_load(yaml_of(known, {**plain, **answers}))
+    made = yaml.safe_load(yaml_of(replace(known, answers={**plain, **known.answers})))
     kind, other = ("video", "track") if known.is_film else ("track", "video")
     content.pop(other, None)
     content[kind] = known.source.name
     wanted = {"scenario", "objects", "floor", "track_units", "ramp_angle_deg", "pixels_per_metre"}
-    wanted |= {"fps", "pixels_per_metre_sd"} & {*answers, *(["fps"] if known.is_film else [])}
+    wanted |= {"fps", "pixels_per_metre_sd"} & {*known.answers, *(["fps"] if known.is_film else [])}
     return {key: made[key] for key in wanted & set(made)} | content
 
 
-def _has_floor(known: Understood, scenario: Scenario, answers: Answers) -> bool:
-    likely = known.likely(answers) if "floor" in scenario.keys else None
+def _has_floor(known: Understood, scenario: Scenario) -> bool:
+    likely = known.likely if "floor" in scenario.keys else None
     return likely is not None and likely.bounces
 
 
-def _of_film(known: Understood, scenario: Scenario, answers: Answers) -> dict[str, Any]:
-    points, shape = known.points(answers), usual_shape(scenario.name)
-    fps = answers.get("fps") or round(known.look.fps or USUAL_FPS, 4)
+def _of_film(known: Understood, scenario: Scenario) -> dict[str, Any]:
+    points, shape = known.points, usual_shape(scenario.name)
+    fps = known.answers.get("fps") or round(known.look.fps or USUAL_FPS, 4)
     content: dict[str, Any] = {"video": known.source.name, "scenario": scenario.name, "fps": fps}
-    if _has_floor(known, scenario, answers):
+    if _has_floor(known, scenario):
         content["floor"] = True
-    if needs_angle(scenario):
-        content["ramp_angle_deg"] = answers.get("ramp_angle_deg")
+    if scenario.is_sloped:
+        content["ramp_angle_deg"] = known.answers.get("ramp_angle_deg")
     if points and len(points) == 1:
         content["direction"] = known.path(points[0]).direction
-    content["pixels_per_metre"] = answers.get("pixels_per_metre")
-    if answers.get("pixels_per_metre_sd") is not None:
-        content["pixels_per_metre_sd"] = answers["pixels_per_metre_sd"]
+    content["pixels_per_metre"] = known.answers.get("pixels_per_metre")
+    if known.answers.get("pixels_per_metre_sd") is not None:
+        content["pixels_per_metre_sd"] = known.answers["pixels_per_metre_sd"]
     if scenario.has_table and known.foot is not None:
         content |= {"origin_px": list(known.foot), "origin_sd_px": FOOT_SD_PX}
     content["objects"] = [

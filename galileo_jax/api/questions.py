@@ -5,16 +5,17 @@ import math
 import re
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from galileo_jax.api.understand import Answers, Understood, listed_things, needs_angle
+from galileo_jax.api.understand import Answers, Understood, listed_things
 from galileo_jax.clip.look import FALL_M_S2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import option_of
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
@@ -22,7 +23,7 @@ LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
 # end: as much as the scale's key allows, a fifth, once it is rounded.
 SIZE_SD_SHARE = 0.19
 GIVEN = ("scenario", "ramp_angle_deg", "pixels_per_metre", "track_units", "fps")
-NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
+NUMBERS = ("fps", "ramp_angle_deg")
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,10 @@ class Question:
     is_open: bool = True  # nobody but a person can say; else the default will do
 
 
-def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
+def questions(known: Understood) -> tuple[Question, ...]:
     """What is still to be asked, in the order in which it is; changes with what is answered."""
-    asked = (
-        _points(known),
-        _scenario(known, answers),
-        _fps(known),
-        _units(known, answers),
-        _angle(known, answers),
-        _scale(known, answers),
-    )
-    told = {*answers, *known.declared}
+    asked = [ask(known) for ask in (_points, _scenario, _fps, _units, _angle, _scale)]
+    told = {*known.answers, *known.declared}
     return tuple(one for one in asked if one is not None and one.key not in told)
 
 
@@ -58,36 +52,36 @@ class Answered:
     """All questions, with what was typed to them."""
 
     questions: tuple[Question, ...]  # in the order in which they are asked
-    answers: Answers  # by keys of the yaml; the defaults where nothing was typed
+    known: Understood  # with the answers; the defaults where nothing was typed
     problems: Mapping[str, str]  # by the question's key, one line that says what would be right
 
 
 def answered(known: Understood, typed: Mapping[str, str]) -> Answered:
     """What a person answers who types this, by the questions' keys, and Enter to all others."""
+    known = replace(known, answers={})
     asked: dict[str, Question] = {}
-    answers: dict[str, Any] = {}
     problems: dict[str, str] = {}
-    while left := [one for one in questions(known, answers) if one.key not in asked]:
+    while left := [one for one in questions(known) if one.key not in asked]:
         one = asked[left[0].key] = left[0]
         try:
-            answers |= parsed(one, typed.get(one.key, ""), known, answers)
+            known = known.with_answers(parsed(one, typed.get(one.key, ""), known))
         except InputError as error:
             problems[one.key] = str(error)
-    return Answered(tuple(asked.values()), answers, problems)
+    return Answered(tuple(asked.values()), known, problems)
 
 
-def assumed(known: Understood, answers: Answers) -> dict[str, Question]:
+def assumed(known: Understood) -> dict[str, Question]:
     """By keys, the questions that nobody answered, and that the motion itself answers."""
-    asked = questions(known, answers)
+    asked = questions(known)
     return {one.key: one for one in asked if one.key == "track_units" and not one.is_open}
 
 
-def check_answered(known: Understood, answers: Answers) -> None:
+def check_answered(known: Understood) -> None:
     """Raises `InputError`, one line with all that is missing, where only a person can say."""
-    missing = [one for one in questions(known, answers) if one.is_open]
+    missing = [one for one in questions(known) if one.is_open]
     if not missing:
         return
-    options = " ".join([*_given(answers), *(one.option for one in missing)])
+    options = " ".join([*_given(known.answers), *(one.option for one in missing)])
     call = f"galileo {shlex.quote(str(known.source))} {options}"
     if known.is_film and known.unseen and missing[0].key == "points":
         raise InputError(
@@ -116,10 +110,10 @@ def _given(answers: Answers) -> Iterator[str]:
 def _option(key: str, value: Any) -> str:
     """An answer by the yaml's key as an option of a call."""
     shown = f"{value:g}" if isinstance(value, float) else value
-    return f"--{key.removesuffix('_deg').replace('_', '-')} {shown}"
+    return f"{option_of(key.removesuffix('_deg'))} {shown}"
 
 
-def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
+def parsed(question: Question, text: str, known: Understood) -> dict[str, Any]:
     """An answer as a person types it, by keys of the yaml; nothing typed: the default.
 
     Raises `InputError` where it is none, and says what would be right.
@@ -130,7 +124,7 @@ def parsed(question: Question, text: str, known: Understood, answers: Answers) -
     if question.key == "points":
         return {"points": _chosen(text, known)}
     if question.key == "pixels_per_metre":
-        return _scale_of(text, _length_px(known, answers))
+        return _scale_of(text, _length_px(known))
     if question.key in NUMBERS:
         return {question.key: None if text == "path" else _number(text, question.key)}
     if question.choices and text not in question.choices:
@@ -155,10 +149,10 @@ def _points(known: Understood) -> Question | None:
     return Question("points", text, why, example, default)
 
 
-def _scenario(known: Understood, answers: Answers) -> Question | None:
+def _scenario(known: Understood) -> Question | None:
     if "scenario" in known.declared:
         return None
-    likely = known.likely(answers)
+    likely = known.likely
     if likely is not None and likely.is_clear:
         return None
     name = likely.scenario if likely else None
@@ -176,14 +170,14 @@ def _fps(known: Understood) -> Question | None:
     return Question("fps", text, "the table counts frames and has no times", _option("fps", 30))
 
 
-def _units(known: Understood, answers: Answers) -> Question | None:
+def _units(known: Understood) -> Question | None:
     seen = known.look.seen
     if seen is None or seen.unit is not None or seen.axes == ("angle",):
         return None
-    if any(one.get("pixels_per_metre") is not None for one in (known.declared, answers)):
+    if any(one.get("pixels_per_metre") is not None for one in (known.declared, known.answers)):
         return None
     text, choices = "In which unit are its lengths?", (*METRES_PER_UNIT, "px")
-    unit, size = _unit_by_gravity(known, answers), max(seen.moved)
+    unit, size = _unit_by_gravity(known), max(seen.moved)
     why = f"it falls with about 9.8 m/s^2 in {unit}, and in no other unit"
     if is_open := unit is None:
         unit = "px" if size >= 50 else "m" if size <= 20 else "cm"
@@ -192,10 +186,10 @@ def _units(known: Understood, answers: Answers) -> Question | None:
     return Question("track_units", text, why, option, unit, choices, is_open)
 
 
-def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
+def _unit_by_gravity(known: Understood) -> str | None:
     """The unit in which a body that flies falls with about 9.8 m/s^2; None where none is."""
-    table, scenario = known.look.table, known.scenario(answers)
-    fps = answers.get("fps") or known.declared.get("fps")
+    table, scenario = known.look.table, known.scenario
+    fps = known.answers.get("fps") or known.declared.get("fps")
     if table is None or scenario is None or scenario.up_shows != "bend":
         return None
     seconds = table.motion(1).seconds(fps)
@@ -210,12 +204,12 @@ def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
     return fits[0] if len(fits) == 1 else None
 
 
-def _angle(known: Understood, answers: Answers) -> Question | None:
-    scenario = known.scenario(answers)
-    if scenario is None or not needs_angle(scenario):
+def _angle(known: Understood) -> Question | None:
+    scenario = known.scenario
+    if scenario is None or not scenario.is_sloped:
         return None
     text = "What is the ramp's angle to the horizontal, in degrees, as measured?"
-    likely = known.likely(answers)
+    likely = known.likely
     told = likely.slope_deg if likely is not None else None
     option, default = _option("ramp_angle_deg", 20), "path"
     if known.is_film and told is None and (known.is_pair or known.foot is not None):
@@ -228,10 +222,10 @@ def _angle(known: Understood, answers: Answers) -> Question | None:
     return Question("ramp_angle_deg", text, why, option, default, (), default is None)
 
 
-def _scale(known: Understood, answers: Answers) -> Question | None:
-    scenario = known.scenario(answers)
+def _scale(known: Understood) -> Question | None:
+    scenario = known.scenario
     unit = known.look.seen.unit if known.look.seen else "px"
-    unit = known.declared.get("track_units") or answers.get("track_units") or unit
+    unit = known.declared.get("track_units") or known.answers.get("track_units") or unit
     table = known.look.table
     is_told = {"rectangle", "pixels_per_metre"} & set(known.declared)
     is_told = is_told or (table is not None and table.calibration is not None)
@@ -239,7 +233,7 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     if unit != "px" or is_told or not on_surface or known.has_objects:
         return None
     text = "How many pixels are a metre? Pixels, such as 900 px"
-    if (size := _length_px(known, answers)) is not None:
+    if (size := _length_px(known)) is not None:
         good_to = f"good to a fifth only, how long object 1 is (some {size:.0f} px), such as 0.06 m"
         text += f"; or, {good_to}"
     why = "friction cannot be told from lengths in pixels"
@@ -251,8 +245,8 @@ def _scale(known: Understood, answers: Answers) -> Question | None:
     return Question("pixels_per_metre", text, why, _option("pixels_per_metre", 900))
 
 
-def _length_px(known: Understood, answers: Answers) -> float | None:
-    points = known.points(answers) if known.is_film else ()
+def _length_px(known: Understood) -> float | None:
+    points = known.points if known.is_film else ()
     size = known.things.get(points[0]) if points else None
     return max(size) if size is not None else None
 

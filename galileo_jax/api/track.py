@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from galileo_jax.api.clips import ClipLike, as_clip, as_list
 from galileo_jax.api.precompile import Compile, precompiling
 from galileo_jax.clip.checks import check_same_objects, check_scale
@@ -22,7 +20,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.report.track_chart import track_chart
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 from galileo_jax.runtime.lazy import go, pd
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.tracking.track import Track as PixelTrack
@@ -73,10 +71,9 @@ class Track:
             columns: dict[str, Any] = {"object": item.name}
             if self.measurement is not None:
                 seen = self.measurement.whole
-                sd = np.sqrt(np.diagonal(seen.covariance_m2[k], axis1=0, axis2=1))
                 columns |= {"time_s": seen.times_s}
                 columns |= {f"{axis}_m": seen.position_m[k, i] for i, axis in enumerate("xy")}
-                columns |= {f"sd_{axis}_m": sd[:, i] for i, axis in enumerate("xy")}
+                columns |= {f"sd_{axis}_m": seen.sd_m[k, i] for i, axis in enumerate("xy")}
                 columns |= {"is_visible": seen.mask[k]}
             if (px := self.pixels) is not None:
                 columns |= {"time_s": px.times_s}
@@ -96,14 +93,12 @@ class Track:
           InputError: the file cannot be written.
         """
         path = Path(path)
-        try:
+        with one_line_of(path):
             if self.measurement is not None:
                 write_observation_csv(path, self.measurement.whole)
             else:
                 assert self.pixels is not None  # a csv track in px needs its scale to load
                 write_pixel_csv(path, self.pixels)
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from error
         return path
 
     def save_tables(self, folder: str | Path) -> tuple[Path, ...]:

@@ -99,7 +99,7 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     if clip.video is None:
         return None
     exact = []
-    if scenario.has_ramp and scenario.angle_deg is None and not clip.ramp_angle_sd_deg:
+    if scenario.is_sloped and not clip.ramp_angle_sd_deg:
         exact.append("ramp_angle_deg")
     is_told = clip.pixels_per_metre is not None and not clip.is_scale_assumed
     if is_told and clip.pixels_per_metre_sd is None and "pixels_per_metre" not in measured.inferred:

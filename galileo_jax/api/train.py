@@ -20,7 +20,7 @@ from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import check_folder, write_json, write_text
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.known_names import check_known, option_of
 from galileo_jax.runtime.precision import in_float64
 
 PRESETS = ("thesis", "galileo")
@@ -86,18 +86,16 @@ def train(
     check_known("--preset", "preset", preset, PRESETS)
     if engine is not None:
         check_known("--engine", "engine", engine, ENGINES)
-    arguments = locals()
-    overrides = {name: arguments[name] for name in (*LEAST, "engine")}
+    numbers = {"samples": samples, "max_epochs": max_epochs, "frames": frames, "seed": seed}
     for name, least in LEAST.items():
-        value = overrides[name]
+        value = numbers[name]
         if value is not None and not (isinstance(value, int) and value >= least):
-            option = f"--{name.replace('_', '-')}"
-            raise InputError(f"{option}: '{value}' is not a whole number, {least} or more")
+            raise InputError(f"{option_of(name)}: '{value}' is not a whole number, {least} or more")
     out = Path(out)
     check_folder(out)
     path = Path(config) if config else config_path(f"train_{preset}.yaml")
     with progress.scope(on_progress, cancel):
-        return _train(out, load_config(path, **overrides), Path(data or out / "data"))
+        return _train(out, load_config(path, **numbers, engine=engine), Path(data or out / "data"))
 
 
 def _train(out: Path, config: TrainConfig, data_folder: Path) -> Trained:

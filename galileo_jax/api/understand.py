@@ -75,7 +75,7 @@ class FilmPath:
 
 @dataclass(frozen=True, eq=False)
 class Understood:
-    """What a film or table shows, and what is declared beside it."""
+    """What a film or table shows, what is declared beside it, and what a person answers."""
 
     source: Path  # the film or table
     yaml_path: Path  # of the yaml beside it, which need not be there
@@ -88,7 +88,12 @@ class Understood:
     foot: Point | None = None  # of a ramp that such a film shows, px; None: it shows none
     is_on_ramp: bool = False  # its first look shows two things on a ramp, one after the other
     unseen: str = ""  # why no moving thing was found in such a film; "" where one was
+    answers: Answers = field(default_factory=dict)
     _paths: dict[Point, FilmPath] = field(default_factory=dict, repr=False)
+
+    def with_answers(self, answers: Answers) -> "Understood":
+        """The same after more answers."""
+        return replace(self, answers={**self.answers, **answers})
 
     @cached_property
     def is_pair(self) -> bool:
@@ -105,13 +110,14 @@ class Understood:
         """Whether somebody declared the objects."""
         return bool(self.declared.get("objects"))
 
-    def points(self, answers: Answers) -> Sequence[Point]:
+    @property
+    def points(self) -> Sequence[Point]:
         """Where a film's objects are in its first frame, in their order; empty where nobody knows.
 
         All things that move as a pair, else the likeliest, where a person said no other.
         """
-        if "points" in answers:
-            return answers["points"]
+        if "points" in self.answers:
+            return self.answers["points"]
         return list(self.things)[:2] if self.is_pair else list(filter(None, [self.likeliest]))
 
     @property
@@ -126,14 +132,14 @@ class Understood:
         kinds = ((point, self.path(point).likely) for point in every)
         return next((point for point, kind in kinds if kind and kind.is_clear), every[0])
 
-    def likely(self, answers: Answers) -> Likely | None:
+    @property
+    def likely(self) -> Likely | None:
         """The likeliest kind of motion, of a film of the thing that was chosen; None: unknown."""
         if (seen := self.look.seen) is not None:
             return seen
-        points = self.points(answers)
-        if len(points) == 1:
-            return self.path(points[0]).likely
-        return self._likely_of_pair(points[1]) if points else None
+        if len(self.points) == 1:
+            return self.path(self.points[0]).likely
+        return self._likely_of_pair(self.points[1]) if self.points else None
 
     def _likely_of_pair(self, struck: Point) -> Likely:
         """Of two things that meet; `struck`: the one that is run into."""
@@ -144,15 +150,17 @@ class Understood:
             return Likely("ramp", why)
         return Likely("from_above", f"{why}, and what is struck goes off at {slope:.0f} degrees")
 
-    def said_scenario(self, answers: Answers) -> str | None:
+    @property
+    def said_scenario(self) -> str | None:
         """Name of the kind of motion that a person declares or answers."""
-        return self.declared.get("scenario") or answers.get("scenario")
+        return self.declared.get("scenario") or self.answers.get("scenario")
 
-    def scenario(self, answers: Answers) -> Scenario | None:
+    @property
+    def scenario(self) -> Scenario | None:
         """The kind of motion: as declared, as answered, as it seems; None: nobody knows."""
-        name = self.said_scenario(answers)
-        if name is None and not {"scenario"} & {*self.declared, *answers}:
-            name = likely.scenario if (likely := self.likely(answers)) else None
+        name = self.said_scenario
+        if name is None and "scenario" not in {*self.declared, *self.answers}:
+            name = likely.scenario if (likely := self.likely) else None
         return SCENARIOS[name] if name is not None and name in SCENARIOS else None
 
     def first_frame(self, point: Point) -> int:
@@ -208,12 +216,7 @@ def is_declared(file: str | Path) -> bool:
         return False
     is_known = str(scenario) in SCENARIOS
     has_angle = "ramp_angle_deg" in declared
-    return has_angle or not is_known or not needs_angle(SCENARIOS[str(scenario)])
-
-
-def needs_angle(scenario: Scenario) -> bool:
-    """Whether a clip of this kind declares the angle of a ramp."""
-    return scenario.has_ramp and scenario.angle_deg is None
+    return has_angle or not is_known or not SCENARIOS[str(scenario)].is_sloped
 
 
 def _check_length(film: Path) -> None:
@@ -320,30 +323,29 @@ def _likely_between_rests(path: PointPath) -> Likely:
     return replace(first, why=f"{first.why}; it moves {len(every)} times, with rests between")
 
 
-def sentence_of(known: Clip | Understood, answers: Answers) -> str:
+def sentence_of(known: Clip | Understood) -> str:
     """What moves, how far and how, what it looks like, and how often it is seen."""
     if isinstance(known, Clip):
         return _of_clip(known)
     if known.look.seen is not None:
-        return _of_table(known.look.seen, known.said_scenario(answers))
+        return _of_table(known.look.seen, known.said_scenario)
     fps = known.look.fps
     rate = f" {fps:.4g} pictures a second." if fps else ""
-    return f"{_of_film(known, answers)}{rate}"
+    return f"{_of_film(known)}{rate}"
 
 
-def _of_film(known: Understood, answers: Answers) -> str:
-    points = known.points(answers)
+def _of_film(known: Understood) -> str:
     if known.has_objects:
         return f"{known.yaml_path.name} says where the objects are."
-    if not points:
+    if not known.points:
         return f"No moving thing was found: {known.unseen}."
     things = "One thing moves" if len(known.things) < 2 else f"{len(known.things)} things move"
-    if len(points) > 1 and (likely := known.likely(answers)) is not None:
-        return f"{things}, one after the other: {_taken(likely, known.said_scenario(answers))}."
-    path = known.path(points[0])
+    if len(known.points) > 1 and known.likely is not None:
+        return f"{things}, one after the other: {_taken(known.likely, known.said_scenario)}."
+    path = known.path(known.points[0])
     if path.likely is None:
         return f"{things}, but cannot be followed."
-    looks = _looks(path.likely, known.said_scenario(answers))
+    looks = _looks(path.likely, known.said_scenario)
     which = "," if len(known.things) < 2 else "; the one that is followed goes"
     return f"{things}{which} {path.moved_px:.0f} px {looks}."
 

@@ -77,12 +77,7 @@ def fit_table(found: "Fit", truth: Mapping[str, float], is_asked: bool = False) 
     """
     from galileo_jax.inference.per_mass import SUFFIX
     from galileo_jax.report.fit_text import error_text, fit_quality
-    from galileo_jax.results.shown import (
-        is_as_declared,
-        shown,
-        shown_parameters,
-        unit_text,
-    )
+    from galileo_jax.results.shown import is_as_declared, shown, shown_parameters, unit_text
 
     result: Mapping[str, Any] = found.result
     entries = shown_parameters(result)

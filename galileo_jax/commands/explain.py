@@ -147,17 +147,17 @@ def _clips(
         with command.progress_display() as display, progress.scope(display, flag):
             return understood(clip, said)
 
-    def ask(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
+    def ask(known: "Understood") -> "Understood":
         is_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-        return asked(known, answers, out) if is_terminal else answers
+        return asked(known, out) if is_terminal else known
 
     clips, to_write = answered_clips(sources_of(list(files)), said, ask, look_at)
-    for known, answers in to_write:
-        _write(known, answers)
+    for known in to_write:
+        _write(known)
     return clips
 
 
-def asked(known: "Understood", answers: dict[str, Any], out: Path | None = None) -> dict[str, Any]:
+def asked(known: "Understood", out: Path | None = None) -> "Understood":
     """Asks at the terminal for all that is open; Enter takes what stands in brackets.
 
     Of a film a picture of what is asked about is written to where results go and, if there is a
@@ -166,28 +166,25 @@ def asked(known: "Understood", answers: dict[str, Any], out: Path | None = None)
     from galileo_jax.api.questions import Question, parsed, questions
     from galileo_jax.api.understand import sentence_of
 
-    is_first = True
-
     def still_open() -> Sequence[Question]:
         with command.progress_display() as display, progress.scope(display):
-            return questions(known, answers)  # of a film what moves may have to be followed
+            return questions(known)  # of a film what moves may have to be followed
 
+    if still_open():
+        command.say(sentence_of(known))
+        _show_marks(known, out or Path("runs") / known.source.stem)
     while open_ones := still_open():
-        if is_first:
-            command.say(sentence_of(known, answers))
-            _show_marks(known, out or Path("runs") / known.source.stem)
-            is_first = False
         one = open_ones[0]
         default = f" [{one.default}]" if one.default is not None else ""
         choices = f" One of {', '.join(one.choices)}" if one.choices else ""
         command.say(f"{one.text}{choices}\n  ({one.why})")
         try:
-            answers = answers | parsed(one, input(f"  {one.key}{default}: "), known, answers)
+            known = known.with_answers(parsed(one, input(f"  {one.key}{default}: "), known))
         except EOFError:
             raise InputError(f"{known.source}: {one.key}: no answer; nothing was written") from None
         except InputError as error:
             command.say(str(error))
-    return answers
+    return known
 
 
 def _show_marks(known: "Understood", folder: Path) -> None:
@@ -219,23 +216,23 @@ def show(picture: Path) -> None:
     threading.Thread(target=open_it, daemon=True).start()
 
 
-def _write(known: "Understood", answers: dict[str, Any]) -> None:
+def _write(known: "Understood") -> None:
     """Writes a yaml that is not there; says what one that is there lacks."""
     from galileo_jax.api.proposed_clip import write_yaml
     from galileo_jax.api.questions import assumed
 
     try:
-        written = write_yaml(known, answers)
+        written = write_yaml(known)
     except InputError as error:
         command.say(f"warning: {error}; the next call asks again")
         return
     if written is not None:
         command.say(f"{written}: written; the next call asks nothing")
-        for key, one in assumed(known, answers).items():
+        for key, one in assumed(known).items():
             command.say(f"warning: {written}: {key}: {one.default} is taken, as {one.why}")
         return
-    lacks = {key: v for key, v in answers.items() if key not in (*known.declared, "points")}
-    if lacks:
+    told = (*known.declared, "points")
+    if lacks := {key: v for key, v in known.answers.items() if key not in told}:
         lines = ", ".join(f"{key}: {'null' if v is None else v}" for key, v in lacks.items())
         command.say(f"{known.yaml_path}: left as it is; it lacks {lines}")
 

@@ -17,6 +17,7 @@ import galileo_jax
 from galileo_jax.commands import command
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import option_of
 
 ARGUMENT = re.compile(r"^  (\w+): (.+(?:\n    .+)*)", re.MULTILINE)  # in a docstring's Args
 WITHOUT = re.compile(r"[;.] None: ([^;]*)")  # what a default of None means
@@ -142,7 +143,7 @@ class VerbParser(command.Parser):
         """
         for name in names:
             argument = arguments_of(self._function)[name]
-            words = [name] if argument.is_positional and not option else [option or flag(name)]
+            words = [name] if argument.is_positional and not option else [option or option_of(name)]
             described = _described(argument, self._without, bool(option))
             described |= {**EVERYWHERE.get(name, {}), **given}
             if described.get("action") == "append":
@@ -160,18 +161,13 @@ class VerbParser(command.Parser):
         self.add_argument("--out", type=Path, metavar="DIR", help=meaning)
 
 
-def flag(name: str) -> str:
-    """The option of an argument."""
-    return f"--{name.replace('_', '-')}"
-
-
 def refuse(
-    asked: Mapping[str, Any], names: Iterable[str], why: str, flag: Callable[[str], str] = flag
+    asked: Mapping[str, Any], names: Iterable[str], why: str, of: Callable[[str], str] = option_of
 ) -> None:
     """Refuses options that a call gives and would ignore, even with their default."""
     for name in names:
         if name in asked:
-            raise InputError(f"{flag(name)}: {why}")
+            raise InputError(f"{of(name)}: {why}")
 
 
 def _described(argument: Argument, without: str, is_option: bool) -> dict[str, Any]:

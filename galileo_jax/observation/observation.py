@@ -98,6 +98,11 @@ class Observation:
         return self.noise_known_to > 0
 
     @property
+    def sd_m(self) -> Float[np.ndarray, "object axis frame"]:
+        """The standard deviation of each coordinate's tracking error, m."""
+        return np.sqrt(np.einsum("oaat->oat", self.covariance_m2))
+
+    @property
     def lasting_m(self) -> Float[np.ndarray, "mode object axis frame"]:
         """Those of `modes_m` that are errors which follow each other in time."""
         modes = np.empty((0, *self.position_m.shape)) if self.modes_m is None else self.modes_m

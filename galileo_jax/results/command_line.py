@@ -7,6 +7,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+from galileo_jax.runtime.known_names import option_of
+
 
 def command_line(verb: str, words: Sequence[str | Path], **options: object) -> str:
     """`galileo VERB WORDS --option value ...`, quoted for a shell.
@@ -21,5 +23,5 @@ def command_line(verb: str, words: Sequence[str | Path], **options: object) -> s
     for name, value in options.items():
         for one in value if isinstance(value, tuple | list) else (value,):
             if one not in (None, "auto", ""):
-                parts += [f"--{name.replace('_', '-')}", str(one)]
+                parts += [option_of(name), str(one)]
     return shlex.join(parts)

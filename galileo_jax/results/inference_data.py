@@ -176,11 +176,7 @@ def _has_density(posterior: Posterior) -> bool:
 def _drawn_again(
     trials: JointProblem, posterior: Posterior, rng: np.random.Generator
 ) -> tuple[np.ndarray, float]:
-    """Draws of the posterior out of draws near it.
-
-    Returns:
-      `[draw, parameter]`, and the weights' Pareto shape.
-    """
+    """Draws of the posterior, `[draw, parameter]`, out of draws near it; the Pareto shape."""
     at, thinned = _thinned(posterior, NUM_WEIGHTED_DRAWS)
     theta = thinned.reshape(-1, thinned.shape[-1])
     z = inverse(trials.parameters, np.asarray(theta))

@@ -58,11 +58,7 @@ class Run:
 
 
 def best_z(posterior: Posterior, folder: Path | None) -> np.ndarray:
-    """`[parameter]`, the best fit in the search space.
-
-    Raises:
-      InputError: an earlier version wrote the run.
-    """
+    """`[parameter]`, the best fit in the search space; refuses a run that has none."""
     if BEST not in posterior.provenance:
         raise InputError(f"{folder}: an earlier version wrote this run; fit the clip anew")
     return np.array(posterior.provenance[BEST])
@@ -96,11 +92,7 @@ def read_result(folder: Path) -> dict[str, Any]:
 
 
 def load_run(folder: Path, engine: str = "auto") -> Run:
-    """Reads a run.
-
-    Raises:
-      InputError: not a folder that `fit` has finished; names the file that is missing.
-    """
+    """Reads a run; refuses a folder that `fit` has not finished, naming what is missing."""
     folder = Path(folder)
     result = read_result(folder)
     clip = load_clip(folder / CLIP)

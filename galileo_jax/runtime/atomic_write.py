@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.errors import InputError, one_line_of
 
 _unfinished: set[Path] = set()
 """Temporary files that are being written, by any thread."""
@@ -48,26 +48,17 @@ def remove_unfinished() -> None:
 
 @contextmanager
 def writing_into(out: Path) -> Iterator[None]:
-    """Turns what goes wrong with writing into a folder into one line that names it.
-
-    Raises:
-      InputError: it is a file, or it cannot be written to.
-    """
+    """Refuses a folder that cannot be written to, before and while files are written inside."""
     check_folder(out)
-    try:
+    with one_line_of(f"--out: {out}"):
         yield
-    except OSError as error:
-        raise InputError(f"--out: {out}: {error.strerror or error}") from error
 
 
 def check_folder(out: Path) -> None:
-    """Asks, before anything is computed, whether a folder can be there and be written to.
+    """Refuses, before anything is computed, a folder that cannot be there or be written to.
 
     It makes a file without a name in the nearest folder that there is: permissions alone do not
     say it (to root everything is permitted, on a read-only disk, too).
-
-    Raises:
-      InputError: no.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"--out: {out} is a file; a folder expected")

@@ -16,23 +16,20 @@ On a CPU nothing is gained: a core computes one call after the other, whoever as
 
 import threading
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 
 from galileo_jax.runtime.progress import Cancelled
 
 
-@dataclass
-class _Call:
+class _Call(NamedTuple):
     program: Any
     args: tuple[Any, ...]
     is_64_bit: bool
-    is_done: bool = False
-    result: Any = None
-    error: BaseException | None = None
+    result: Future[Any]
 
 
 _own = threading.local()
@@ -52,14 +49,14 @@ class Together:
 
     def __init__(self) -> None:
         self.num_calls = self.num_made = 0
-        self._changed = threading.Condition()
+        self._lock = threading.Lock()
         self._num_members = 0
         self._waiting: list[_Call] = []
         self._is_closed = False
 
     def expect(self, count: int = 1) -> None:
         """Members to come, which the others wait for; each then enters `member` once."""
-        with self._changed:
+        with self._lock:
             self._num_members += count
 
     @contextmanager
@@ -70,48 +67,41 @@ class Together:
             yield
         finally:
             _own.group = None
-            with self._changed:
+            with self._lock:
                 self._num_members -= 1
                 self._make_if_all_wait()
 
     def call(self, program: Any, args: tuple[Any, ...]) -> Any:
-        """The program's result, once all members wait for theirs.
-
-        Raises:
-          Cancelled: the group was closed.
-        """
-        own = _Call(program, args, jax.config.read("jax_enable_x64"))
-        with self._changed:
+        """The program's result, once all members wait for theirs; `Cancelled` once it is closed."""
+        own = _Call(program, args, jax.config.read("jax_enable_x64"), Future())
+        with self._lock:
+            if self._is_closed:
+                raise Cancelled("cancelled")
             self._waiting.append(own)
             self._make_if_all_wait()
-            while not own.is_done and not self._is_closed:
-                self._changed.wait()
-        if own.error is not None:
-            raise own.error
-        if not own.is_done:
-            raise Cancelled("cancelled")
-        return own.result
+        return own.result.result()
 
     def close(self) -> None:
         """No call is made any more."""
-        with self._changed:
+        with self._lock:
             self._is_closed = True
-            self._changed.notify_all()
+            for one in self._waiting:
+                one.result.set_exception(Cancelled("cancelled"))
+            self._waiting = []
 
     def _make_if_all_wait(self) -> None:
         """Makes what most members wait for: in loops they soon come to what the others wait for.
 
         The lock is held meanwhile, for all of them wait.
         """
-        if len(self._waiting) < self._num_members or not self._waiting or self._is_closed:
+        if len(self._waiting) < self._num_members or not self._waiting:
             return
         groups: dict[Any, list[_Call]] = {}
         for one in self._waiting:
             key = (id(one.program), one.is_64_bit, one.program.key_of(one.args))
             groups.setdefault(key, []).append(one)
         self._make(max(groups.values(), key=len))
-        self._waiting = [one for one in self._waiting if not one.is_done]
-        self._changed.notify_all()
+        self._waiting = [one for one in self._waiting if not one.result.done()]
 
     def _make(self, calls: Sequence[_Call]) -> None:
         self.num_calls += len(calls)
@@ -121,9 +111,7 @@ class Together:
             with jax.enable_x64(first.is_64_bit):
                 results = first.program.of_many([one.args for one in calls])
             for one, result in zip(calls, results, strict=True):
-                one.result = result
+                one.result.set_result(result)
         except Exception as error:
             for one in calls:
-                one.error = error
-        for one in calls:
-            one.is_done = True
+                one.result.set_exception(error)

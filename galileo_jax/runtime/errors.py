@@ -13,6 +13,15 @@ class InputError(ValueError):
 
 
 @contextmanager
+def one_line_of(what: object) -> Iterator[None]:
+    """Turns what goes wrong with files inside into one line that begins with `what`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{what}: {error.strerror or error}") from error
+
+
+@contextmanager
 def named(what: object) -> Iterator[None]:
     """Begins what an `InputError` inside says with the name of the file that it is about."""
     try:

@@ -62,14 +62,11 @@ def cache_folder() -> Path | None:
     return Path(platformdirs.user_cache_dir("galileo_jax", appauthor=False)) / "jax"
 
 
-def enable_cache() -> Path | None:
+def enable_cache() -> None:
     """Turns the cache on for this process; commands call it, importing the package does not.
 
     A folder already set for JAX (``JAX_COMPILATION_CACHE_DIR``) is left as it is. The cache
     can be deleted at any time.
-
-    Returns:
-      The folder in use, or None where the cache is switched off.
     """
     import jax
 
@@ -78,11 +75,8 @@ def enable_cache() -> Path | None:
     folder = cache_folder()
     if folder is None:
         jax.config.update("jax_enable_compilation_cache", False)
-        return None
-    if configured := os.environ.get("JAX_COMPILATION_CACHE_DIR"):
-        return Path(configured)
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    # Small programs too: there are many, and reading one takes a few milliseconds.
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-    return folder
+    elif not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        # Small programs too: there are many, and reading one takes a few milliseconds.
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

@@ -77,8 +77,7 @@ def _inside(scope: _Scope) -> Iterator[None]:
 def report(stage: str, share: float, partial: Any = None) -> None:
     """Reports a stage, the share of the work that is done, and a partial result.
 
-    Raises:
-      Cancelled: the caller asked for it.
+    Raises `Cancelled` where the caller asked for it.
     """
     check_cancelled()
     now = _scope.get()

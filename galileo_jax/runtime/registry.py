@@ -22,18 +22,11 @@ Registered = TypeVar("Registered")
 class Registry(Mapping[str, Entry]):
     """Things by their `name`: classes that have one, or instances.
 
-    The modules that register them are imported when a name is first asked for.
-
-    Attributes:
-      singular: what one entry is called in messages.
-      plural: what several are called.
+    All modules of `packages`, and a group of installed packages' entry points, register them; they
+    are imported when a name is first asked for. `singular` and `plural`: their name in messages.
     """
 
     def __init__(self, singular: str, plural: str, *packages: str, entry_points: str | None = None):
-        """A registry without entries.
-
-        All modules of `packages` are imported, and a group of installed packages' entry points.
-        """
         self.singular, self.plural = singular, plural
         self._packages = list(packages)
         self._entry_points = entry_points
@@ -41,11 +34,7 @@ class Registry(Mapping[str, Entry]):
         self._is_loaded = False
 
     def register(self, entry: Registered) -> Registered:
-        """Makes an entry known under its `name`; decorates a class.
-
-        Raises:
-          InputError: the name is taken.
-        """
+        """Makes an entry known under its `name`, which is to be free; decorates a class."""
         named: Any = entry
         if named.name in self._entries:
             raise InputError(f"two {self.plural} are named {named.name!r}")
@@ -59,20 +48,12 @@ class Registry(Mapping[str, Entry]):
             self._is_loaded = False
 
     def names(self) -> tuple[str, ...]:
-        """All names, sorted.
-
-        Raises:
-          InputError: an installed package's entry point cannot be loaded.
-        """
+        """All names, sorted."""
         self._load()
         return tuple(sorted(self._entries))
 
     def __getitem__(self, name: str) -> Entry:
-        """The entry of that name.
-
-        Raises:
-          InputError: nothing is registered under `name`; the message lists what is.
-        """
+        """The entry of that name; where there is none, an `InputError` lists what there is."""
         self._load()
         if name not in self._entries:
             known = self.names()
@@ -92,10 +73,7 @@ class Registry(Mapping[str, Entry]):
         return len(self.names())
 
     def _load(self) -> None:
-        """Imports what registers entries.
-
-        Two threads may do so at once: each module is imported once, by one of them.
-        """
+        """Imports what registers entries; of two threads that do so, one imports each module."""
         if self._is_loaded:
             return
         for package in list(self._packages):

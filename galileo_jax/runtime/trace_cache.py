@@ -12,7 +12,6 @@ import contextlib
 import functools
 import hashlib
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -55,8 +54,8 @@ class TraceCached:
         functools.update_wrapper(self, function)
         self._function, self._num_static = function, num_static
         self._jitted = jax.jit(function, static_argnums=tuple(range(num_static)))
-        self._programs: OrderedDict[Any, Callable[..., Any]] = OrderedDict()
-        self._lock = threading.Lock()
+        self._programs = functools.lru_cache(MOST_PROGRAMS)(self._program)
+        self._lock = threading.RLock()
 
     def __call__(self, *args: Any) -> Any:
         """Runs the function."""
@@ -66,7 +65,7 @@ class TraceCached:
         group = call_merging.current()
         if group is not None:
             return group.call(self, args)
-        return self._held(key)([_array(leaf) for leaf in leaves])
+        return self._held(key)(leaves)
 
     def key_of(self, args: tuple[Any, ...]) -> Any:
         """What calls have in common that can be made together."""
@@ -77,7 +76,7 @@ class TraceCached:
         split = [self._split(args) for args in calls]
         key = split[0][1]
         if len(calls) == 1:
-            return [self._held(key)([_array(leaf) for leaf in split[0][0]])]
+            return [self._held(key)(split[0][0])]
         # Few sizes: every one of them costs a compilation. The first call fills what is empty.
         many = 1 << (len(calls) - 1).bit_length()
         rows = [leaves for leaves, _ in split] + [split[0][0]] * (many - len(calls))
@@ -87,25 +86,16 @@ class TraceCached:
     def _split(self, args: tuple[Any, ...]) -> tuple[list[Any], Any]:
         """The arrays of a call, and what its program is found by."""
         static, traced = args[: self._num_static], args[self._num_static :]
-        leaves, tree = jax.tree.flatten(traced)
-        shapes = tuple((np.shape(leaf), _dtype(leaf)) for leaf in leaves)
+        given, tree = jax.tree.flatten(traced)
+        leaves = [leaf if isinstance(leaf, jax.Array) else np.asarray(leaf) for leaf in given]
+        shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
         # The setting may be the calling thread's own; dtypes of constants follow it.
         return leaves, (static, tree, shapes, _setting("jax_enable_x64"))
 
     def _held(self, key: Any, many: int | None = None) -> Callable[..., Any]:
         """The program of a key; of `many` calls at once."""
-        key = (*key, many)
-        program = self._programs.get(key)
-        if program is None:
-            with self._lock:  # parts of a batch come on threads: one of them traces
-                program = self._programs.get(key) or self._program(key)
-                self._programs[key] = program
-                while len(self._programs) > MOST_PROGRAMS:
-                    self._programs.popitem(last=False)
-        else:
-            with contextlib.suppress(KeyError):  # another thread has just dropped it
-                self._programs.move_to_end(key)
-        return program
+        with self._lock:  # parts of a batch come on threads: one of them traces
+            return self._programs((*key, many))
 
     def _program(self, key: Any) -> Callable[..., Any]:
         """Reads the program, or traces and writes it; maps leaves to the function's result."""
@@ -131,14 +121,6 @@ class TraceCached:
 
         call.__name__ = self._function.__name__  # for JAX's logs and profiles
         return jax.jit(call)
-
-
-def _array(leaf: Any) -> Any:
-    return leaf if isinstance(leaf, jax.Array) else np.asarray(leaf)
-
-
-def _dtype(leaf: Any) -> Any:
-    return leaf.dtype if hasattr(leaf, "dtype") else np.asarray(leaf).dtype
 
 
 def _folder() -> Path | None:

@@ -40,10 +40,10 @@ def understand(clip: str, typed: Mapping[str, str]) -> dict[str, Any]:
     """What a clip shows in one sentence, and what is asked of a person."""
     known = _understood(clip, {})
     if isinstance(known, Clip):
-        return {"sentence": sentence_of(known, {}), "questions": [], "problems": {}, "things": []}
+        return {"sentence": sentence_of(known), "questions": [], "problems": {}, "things": []}
     found = answered(known, typed)
     return {
-        "sentence": sentence_of(known, found.answers),
+        "sentence": sentence_of(found.known),
         "questions": [asdict(one) for one in found.questions],
         "problems": dict(found.problems),
         "things": [[*place, *size] for place, size in known.things.items()],
@@ -53,16 +53,16 @@ def understand(clip: str, typed: Mapping[str, str]) -> dict[str, Any]:
 def explain(clips: Sequence[str], typed: Mapping[str, str], run: str) -> dict[str, Any]:
     """What `galileo FILE` does, with answers as somebody types them there."""
 
-    def ask(known: Understood, answers: dict[str, Any]) -> dict[str, Any]:
+    def ask(known: Understood) -> Understood:
         found = answered(known, typed)
         if found.problems:
             raise InputError(next(iter(found.problems.values())))
-        return {**answers, **found.answers}
+        return known.with_answers(found.known.answers)
 
     checked, asked = answered_clips(clips, {}, ask, _understood)
-    for known, answers in asked:
+    for known in asked:
         with contextlib.suppress(InputError):  # a folder that is not to be written in
-            write_yaml(known, answers)
+            write_yaml(known)
     found = gx.explain(checked, out=run)
     _keep(run, run, found.fit)
     return views.explanation_view(found)
