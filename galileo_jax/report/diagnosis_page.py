@@ -125,7 +125,7 @@ def write_diagnosis_page(
         provenance(command, clips, _engine_and_seed(record)),
     ]
     hidden = "" if truth is None else html.prose(f"Truth: {truth}.")
-    go_on = f'<p class="soft">Next: {html.code(next_command)}</p>'
+    go_on = html.prose(html.Html(f"Next: {html.code(next_command)}"), "soft")
     more = "\n".join([hidden, html.items(verdict["advice"]), go_on])
     is_good = verdict["status"] != "unknown"
     return html.write_page(path, "diagnosis", title, record["sentence"], sections, more, is_good)

@@ -109,11 +109,10 @@ def residual_panel(
     largest = max(largest, float(np.nanmax(np.abs([filled, hollow]), initial=0.0)))
     bound = max(SMALLEST_RANGE, 1.1 * largest)
     colour, xlim = object_colour(index), time_limits(times_s)
-    two = np.full(2, 2.0)
     return Panel(
         ylabel="residual / noise",
         marks=(
-            Band(np.array(xlim), -two, two, "ink", "95 % of noise", 0.07),
+            noise_band(xlim, "95 % of noise"),
             Points(times_s, hollow, colour, hollow_name, is_hollow=True),
             Points(times_s, filled, colour, filled_name),
         ),
@@ -125,6 +124,12 @@ def residual_panel(
         highlights=(highlight,),
         level=0.0,
     )
+
+
+def noise_band(xlim: tuple[float, float], name: str) -> Band:
+    """Where 95 % of residuals in units of the noise are, if they are noise."""
+    two = np.full(2, 2.0)
+    return Band(np.array(xlim), -two, two, "ink", name, 0.07)
 
 
 def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int) -> Panel:

@@ -65,10 +65,8 @@ def write_report(
     )
     more = _top(run) + _headlines(parameters)
     if lead:
-        links = "".join(
-            f"<p>{html.link(text, place)}</p>\n" for text, place in (beside or {}).items()
-        )
-        more = f"{links}{html.prose(quality)}\n{more}"
+        links = (html.prose(html.link(*one)) for one in (beside or {}).items())
+        more = "\n".join([*links, html.prose(quality), more])
     sections = [
         _undetermined(run, fitted),
         _motion(run, fitted),
@@ -149,11 +147,11 @@ def _undetermined(run: Run, fitted: PosteriorPredictive) -> str:
     by_reason: dict[str, list[str]] = {}
     for name, reason in fit_text.undetermined(run, fitted).items():
         by_reason.setdefault(reason, []).append(meaning(name) or name)
-    listed = "".join(
-        f"<li><strong>{escape(', '.join(names))}</strong>: {escape(reason)}.</li>"
+    listed = html.items(
+        html.Html(f"<strong>{escape(', '.join(names))}</strong>: {escape(reason)}.")
         for reason, names in by_reason.items()
     )
-    body = f"<ul>{listed}</ul>" if listed else html.prose("It determines all main parameters.")
+    body = listed or html.prose("It determines all main parameters.")
     return html.section("What the clip does not determine", body)
 
 

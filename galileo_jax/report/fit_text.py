@@ -9,7 +9,7 @@ from typing import Any
 from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
-from galileo_jax.report.phrases import sentence
+from galileo_jax.report.phrases import sentence, two_figures
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.run import CLIP, Run
 from galileo_jax.results.shown import shown_parameters, unit_text
@@ -148,9 +148,7 @@ def nearness(error: Mapping[str, Any]) -> list[str]:
     """How near the fit comes to what was seen: in mm, and as a share of the way, where known."""
     units = {"rms_mm": "mm", "rms_percent_of_way": "% of the way"}
     known = {unit: error.get(key) for key, unit in units.items()}  # None in a file, NaN before
-    return [
-        f"{float(f'{size:.2g}'):g} {unit}" for unit, size in known.items() if size and size == size
-    ]
+    return [f"{two_figures(size)} {unit}" for unit, size in known.items() if size and size == size]
 
 
 def distance_text(error: Mapping[str, Any]) -> str:
@@ -212,8 +210,11 @@ def _size_text(size: float, unit: str) -> str:
 def chi2_text(error: Mapping[str, Any]) -> str:
     """What the fit leaves over what noise of the stated size would, as a number."""
     chi2 = error["chi2_per_dof"]
-    known = chi2 is not None and math.isfinite(chi2)
-    return f"chi2 per degree of freedom {chi2:.2f}" if known else "chi2 not known"
+    return f"chi2 per degree of freedom {chi2:.2f}" if _is_known(chi2) else "chi2 not known"
+
+
+def _is_known(value: float | None) -> bool:
+    return value is not None and math.isfinite(value)
 
 
 def error_text(error: Mapping[str, Any]) -> str:
@@ -221,7 +222,7 @@ def error_text(error: Mapping[str, Any]) -> str:
 
     No two frames that follow each other may be seen; then there is no velocity.
     """
-    if not (error["rmse"] is not None and math.isfinite(error["rmse"])):
+    if not _is_known(error["rmse"]):
         return chi2_text(error)
     return (
         f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
@@ -232,7 +233,7 @@ def error_text(error: Mapping[str, Any]) -> str:
 def _of_chi2(error: Mapping[str, Any]) -> str:
     """The same in a sentence."""
     chi2 = error["chi2_per_dof"]
-    if chi2 is None or not math.isfinite(chi2):
+    if not _is_known(chi2):
         return "chi2 per degree of freedom cannot be computed."
     size = f"{math.sqrt(chi2):.2g} times the stated noise"
     if not error.get("explained_by_noise", True):

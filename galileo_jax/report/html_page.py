@@ -23,9 +23,13 @@ NO_SCRIPT = (
 
 
 class Html(str):
-    """Text that is HTML already; a cell of a table that is not is escaped."""
+    """Text that is HTML already; whatever takes text escapes what is not."""
 
     __slots__ = ()
+
+
+def _html(text: str) -> str:
+    return text if isinstance(text, Html) else escape(text)
 
 
 def write_page(
@@ -76,8 +80,8 @@ def section(heading: str, *parts: str) -> str:
 
 
 def prose(text: str, look: str = "") -> str:
-    """A paragraph of plain text; `look`: "soft", "warn"."""
-    return f'<p class="{look}">{escape(text)}</p>' if look else f"<p>{escape(text)}</p>"
+    """A paragraph of plain text or `Html`; `look`: "soft", "warn"."""
+    return f'<p class="{look}">{_html(text)}</p>' if look else f"<p>{_html(text)}</p>"
 
 
 def link(text: str, place: str) -> Html:
@@ -136,21 +140,21 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], only_wide: Sequenc
     kinds = ["n wide" if name in only_wide else "n" for name in head]
     lines = []
     for tag, row in (('th scope="col"', head), *(("td", row) for row in rows)):
-        cells = (one if isinstance(one, Html) else escape(one) for one in row)
-        line = (f'<{tag} class="{k}">{c}</{tag[:2]}>' for c, k in zip(cells, kinds, strict=True))
+        cells = zip(map(_html, row), kinds, strict=True)
+        line = (f'<{tag} class="{kind}">{cell}</{tag[:2]}>' for cell, kind in cells)
         lines.append(f"<tr>{''.join(line)}</tr>")
     return f'<div class="table"><table>{"".join(lines)}</table></div>'
 
 
 def listing(entries: Mapping[str, str]) -> str:
     """Names with what they stand for, plain text or `Html`."""
-    cells = {k: v if isinstance(v, Html) else escape(v) for k, v in entries.items()}
-    return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{v}</dd>' for k, v in cells.items())}</dl>"
+    listed = (f"<dt>{escape(name)}</dt><dd>{_html(text)}</dd>" for name, text in entries.items())
+    return f"<dl>{''.join(listed)}</dl>"
 
 
 def items(entries: Iterable[str]) -> str:
-    """A list of plain sentences; empty without any."""
-    listed = "".join(f"<li>{escape(entry)}</li>" for entry in entries)
+    """A list of sentences, plain text or `Html`; empty without any."""
+    listed = "".join(f"<li>{_html(entry)}</li>" for entry in entries)
     return f"<ul>{listed}</ul>" if listed else ""
 
 

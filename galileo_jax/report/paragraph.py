@@ -9,7 +9,7 @@ from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.diagnosis_text import noise_text
 from galileo_jax.report.fit_text import imperfection_text, meaning, nearness
-from galileo_jax.report.phrases import listed, sentence
+from galileo_jax.report.phrases import listed, sentence, two_figures
 from galileo_jax.results.shown import is_as_declared, shown, shown_parameters
 
 NUMBERED = re.compile(r"(object ?)?\d*", re.IGNORECASE)  # a name that says nothing
@@ -267,7 +267,7 @@ def _smaller(name: str, told: Mapping[str, Any], number: str | None, is_first: b
     if number is None:
         return text
     what = number if FRICTION.fullmatch(number) else _words(number)
-    changed = f"{what} by {_figures(abs(told['changes'][number]['by']))}"
+    changed = f"{what} by {two_figures(abs(told['changes'][number]['by']))}"
     if strength is None:
         return f"{text} ({_strength(name, told, told['usual'])} would change {changed})"
     return f"{text} ({'which would change ' if is_first else ''}{changed})"
@@ -275,9 +275,6 @@ def _smaller(name: str, told: Mapping[str, Any], number: str | None, is_first: b
 
 def _strength(name: str, told: Mapping[str, Any], value: float) -> str:
     """A strength of an effect with its unit, or in per cent."""
-    return f"{_figures(100 * value)} %" if name in SHARES else _figures(value) + _unit(told["unit"])
-
-
-def _figures(value: float) -> str:
-    """Two of them."""
-    return f"{float(f'{value:.2g}'):g}"
+    if name in SHARES:
+        return f"{two_figures(100 * value)} %"
+    return two_figures(value) + _unit(told["unit"])

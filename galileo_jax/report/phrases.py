@@ -11,3 +11,8 @@ def sentence(text: str) -> str:
 def listed(parts: Sequence[str], word: str = "and") -> str:
     """`a, b and c`."""
     return f" {word} ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+
+
+def two_figures(value: float) -> str:
+    """A number with two figures, large ones without an exponent."""
+    return f"{float(f'{value:.2g}'):g}"

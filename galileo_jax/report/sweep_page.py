@@ -49,18 +49,18 @@ def write_sweep_page(
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
     label = labels(done)
-    sections = [class_section(found), clips_section(clips)]
     is_truth_known = any(row["hidden"] for row in done)
-    if is_truth_known:
-        sections.append(_errors("Error by effect", EFFECT, done, lambda row: row["hidden"], label))
-    if is_truth_known or len({label(row) for row in done}) > 1:
-        caption = METHOD if is_truth_known else NO_TRUTH
-        sections.append(_errors("Error by method", caption, done, label, label))
-        sections += [_confusion(done), _methods(done, label)]
-    else:
-        sections.append(_confusion(done))
+    to_compare = done if is_truth_known or len(set(map(label, done))) > 1 else []
+    with_truth = done if is_truth_known else []
+    caption = METHOD if is_truth_known else NO_TRUTH
     cells = {"command": html.code(command), "versions": versions_text()}
-    sections += [
+    sections = [
+        class_section(found),
+        clips_section(clips),
+        _errors("Error by effect", EFFECT, with_truth, lambda row: row["hidden"], label),
+        _errors("Error by method", caption, to_compare, label, label),
+        _confusion(done),
+        _methods(to_compare, label) if to_compare else "",
         _failures(failed),
         html.section("Provenance", html.prose(CELLS), html.listing(cells)),
     ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from galileo_jax.report.chart import Band, Chart, Line, Panel, Points, time_limits
 from galileo_jax.report.diagnosis_charts import friction_chart, known_objects, missing_force_chart
+from galileo_jax.report.fit_charts import noise_band
 from galileo_jax.report.plotly_figure import dark, figure, to_json
 from galileo_jax.report.style import object_colour
 
@@ -67,9 +68,8 @@ def residual_figure(
 
     `extra`: another model's name, and the residuals that it leaves.
     """
-    times, two = motion["times"], np.full(2, 2.0)
-    ends = time_limits(times)
-    marks: list[Any] = [Band(np.array(ends), -two, two, "ink", "", 0.07)]
+    times, ends = motion["times"], time_limits(motion["times"])
+    marks: list[Any] = [noise_band(ends, "")]
     for i, name in enumerate(motion["objects"]):
         for axis, values in zip("xy", motion["white"][i], strict=False):
             label, is_hollow = f"{name}, {axis}", axis == "y"

@@ -7,14 +7,13 @@ from typing import Any
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.clip_state import Sheet, Table, changed, opened, redone, undone
-from galileo_jax.studio.frames import Frames
+from galileo_jax.studio.frames import frames_of
 from galileo_jax.studio.marks import Marks
-from galileo_jax.studio.paths import tables, videos
+from galileo_jax.studio.paths import clips
 from galileo_jax.studio.stages import Trials
 from galileo_jax.studio.store import Store
 
 MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
-MOST_FRAMES = 4  # clips whose frames are held
 
 
 class Clips:
@@ -30,11 +29,10 @@ class Clips:
         self.seen: Mapping[str, Any] | None = None  # what is understood of the active clip
         self.versions: Counter[str] = Counter()
         self._unopened: dict[str, Path] = {}
-        self._frames: dict[str, Frames] = {}
 
     def scan(self) -> None:
         """Looks at the folder again; a video is decoded once to know it, the first ones now."""
-        for name, path in {**tables(self.root), **videos(self.root)}.items():
+        for name, path in clips(self.root).items():
             if name not in self.sheets:
                 self._unopened[name] = path
                 if len(self.sheets) < MOST_AT_ONCE:
@@ -78,11 +76,7 @@ class Clips:
         sheet = self.sheets.get(name)
         if not isinstance(sheet, Sheet):
             return None
-        if name not in self._frames:
-            while len(self._frames) >= MOST_FRAMES:
-                self._frames.pop(next(iter(self._frames)))
-            self._frames[name] = Frames(sheet.source)
-        return self._frames[name].picture(index)
+        return frames_of(sheet.source).picture(index)
 
     def mark(self, marks: Marks) -> None:
         """Draws, and writes it to the yaml at once."""

@@ -2,6 +2,7 @@
 
 import tempfile
 import threading
+from functools import lru_cache
 from pathlib import Path
 
 from galileo_jax.report.video_frames import jpeg
@@ -10,6 +11,7 @@ from galileo_jax.video import decode
 LARGEST_PX = 1280
 QUALITY = 85
 PATIENCE_S = 10.0  # for a frame to be decoded
+MOST_HELD = 4  # videos
 
 
 class Frames:
@@ -45,3 +47,9 @@ class Frames:
 
     def _path(self, index: int) -> Path:
         return Path(self._folder.name) / f"{index:06d}.jpg"
+
+
+@lru_cache(MOST_HELD)
+def frames_of(video: Path) -> Frames:
+    """The frames of a video, of which the last few that were looked at are held."""
+    return Frames(video)

@@ -50,16 +50,21 @@ def declared(content: Mapping[str, Any], size_px: tuple[int, int], fps: float) -
         )
         for one in listed
     )
-    marks = Marks(str(content["scenario"]), float(content.get("fps", fps)), objects)
-    first = listed[0].get("first_frame", 0) if listed else 0
-    last = listed[0].get("last_frame") if listed else None
-    marks = replace(marks, first_frame=int(first or 0), last_frame=last)
+    stick, metres = _stick(size_px, content.get("pixels_per_metre"))
+    first = listed[0] if listed else {}
+    marks = Marks(
+        str(content["scenario"]),
+        float(content.get("fps", fps)),
+        objects,
+        stick=stick,
+        stick_m=metres,
+        first_frame=int(first.get("first_frame") or 0),
+        last_frame=first.get("last_frame"),
+    )
     if (found := content.get("rectangle")) is not None:
-        corners = tuple(_point(corner) for corner in found["corners_px"])
+        corners = tuple(map(_point, found["corners_px"]))
         width, height = found["sides_m"]
         marks = replace(marks, rectangle=corners, rectangle_m=(float(width), float(height)))
-    stick, metres = _stick(size_px, content.get("pixels_per_metre"))
-    marks = replace(marks, stick=stick, stick_m=metres)
     if not marks.has_ramp:
         return marks
     foot = _pair(content.get("origin_px"))

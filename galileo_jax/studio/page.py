@@ -233,7 +233,7 @@ def _panel(tab: Tab) -> None:
             for name in session.chosen:
                 look = ui.button(name, on_click=partial(session.look_at, name), color=None)
                 look.props("flat no-caps").classes("main" if name == session.active else "plain")
-    is_left = (session.trials.run / "result.json").is_file() and session.results.fit is None
+    is_left = session.trials.file("fit").is_file() and session.results.fit is None
     if is_left and not session.error and tab.stage in ("compare", "diagnose", "predict"):
         ui.label("Opening the run …").classes("soft")
     PANELS[tab.stage](tab)

@@ -1,7 +1,7 @@
 """Which files the studio touches: only those below the folder that it was opened on."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,29 +36,23 @@ def safe_name(name: str) -> str:
     return name
 
 
-def videos(root: Path) -> dict[str, Path]:
-    """The videos that lie in a folder, by name without suffix; links out of it are left out."""
-    return _lying(root, is_film)
+def clips(root: Path) -> dict[str, Path]:
+    """The clips of a folder by name without suffix: films, and tables that a yaml declares.
 
-
-def tables(root: Path) -> dict[str, Path]:
-    """The tables of a folder that a yaml beside them declares, by name without suffix."""
-
-    def is_declared(path: Path) -> bool:
-        declared = yaml_content(path.with_suffix(".yaml")) if is_track(path) else {}
-        return declared.get("track") == path.name
-
-    return _lying(root, is_declared)
-
-
-def _lying(root: Path, is_wanted: Callable[[Path], bool]) -> dict[str, Path]:
-    """Files of a folder, the first of each name."""
+    A film goes before a table of its name. Links out of the folder are left out.
+    """
     found: dict[str, Path] = {}
-    for path in sorted(root.iterdir()):
+    for path in sorted(root.iterdir(), key=lambda path: (not is_film(path), path)):
         is_plain = NAME.fullmatch(path.stem) and not path.name.startswith(".") and path.is_file()
-        if is_plain and path.resolve().is_relative_to(root.resolve()) and is_wanted(path):
+        if is_plain and path.resolve().is_relative_to(root.resolve()) and _is_clip(path):
             found.setdefault(path.stem, path)
     return found
+
+
+def _is_clip(path: Path) -> bool:
+    if not is_track(path):
+        return is_film(path)
+    return yaml_content(path.with_suffix(".yaml")).get("track") == path.name
 
 
 def check_declared(root: Path, folder: Path, content: Mapping[str, Any]) -> None:

@@ -224,7 +224,7 @@ class Session(Clips):
         One whose effects come from a program is loaded only where somebody has pressed for it.
         """
         run = self.trials.run
-        if self.results.fit is not None or not (run / "result.json").is_file():
+        if self.results.fit is not None or not self.trials.file("fit").is_file():
             return
         self._loop = self._loop or asyncio.get_running_loop()
         try:
@@ -386,7 +386,7 @@ class Session(Clips):
         if task in VIEWED:
             entry[f"{task}_view"] = content["view"]
         if task == "fit":
-            new = results.round_of(document(trials.run / "result.json"))
+            new = results.round_of(document(trials.file("fit")))
             known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
             entry["rounds"] = results.with_round(known, new)  # and those that commands have left
         if task == "compare" and entry.get("rounds"):

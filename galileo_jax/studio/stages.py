@@ -1,5 +1,6 @@
 """The stages: which are done, which are out of date, which wait for another."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -106,30 +107,24 @@ def changed_at(path: Path) -> int:
 def _track_state(sheet: Sheet | Table, store: Store) -> State:
     if isinstance(sheet, Table):
         return "done"
-    path = track_files(sheet) / "track_px.csv"
-    if not path.is_file():
-        return "open"
     made = store.get("clips", sheet.name).get("tracked")
-    return _fresh(path, made, track_mark(sheet), (sheet,))
+    return _fresh(track_files(sheet) / "track_px.csv", made, track_mark(sheet), (sheet.yaml,))
 
 
 def _state(trials: Trials, stage: str, entry: dict[str, Any], now: str) -> State:
-    path = trials.file(stage)
-    if not path.is_file():
+    sources = [sheet.yaml for sheet in trials.sheets]
+    if stage in ("compare", "predict"):
+        sources.append(trials.run / FILES["fit"])
+    return _fresh(trials.file(stage), entry.get(stage), now, sources)
+
+
+def _fresh(path: Path, made: Any, now: str, sources: Iterable[Path]) -> State:
+    """Of a file by its entry in the store, else by its age beside that of its sources."""
+    if not (at := changed_at(path)):
         return "open"
-    fit = trials.run / FILES["fit"]
-    of_fit = (fit,) if stage in ("compare", "predict") and fit.is_file() else ()
-    return _fresh(path, entry.get(stage), now, trials.sheets, of_fit)
-
-
-def _fresh(
-    path: Path, made: Any, now: str, sheets: tuple[Sheet | Table, ...], more: tuple[Path, ...] = ()
-) -> State:
-    if isinstance(made, dict) and made.get("at") == path.stat().st_mtime_ns:
+    if isinstance(made, dict) and made.get("at") == at:
         return "done" if made.get("of") == now else "stale"
-    sources = [*more, *(sheet.yaml for sheet in sheets if sheet.yaml.is_file())]
-    youngest = max((one.stat().st_mtime_ns for one in sources), default=0)
-    return "done" if path.stat().st_mtime_ns >= youngest else "stale"
+    return "done" if at >= max(map(changed_at, sources), default=0) else "stale"
 
 
 def made(path: Path, of: str) -> dict[str, Any]:

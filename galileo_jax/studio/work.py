@@ -64,7 +64,7 @@ def explain(clips: Sequence[str], typed: Mapping[str, str], run: str) -> dict[st
         with contextlib.suppress(InputError):  # a folder that is not to be written in
             write_yaml(known)
     found = gx.explain(checked, out=run)
-    _keep(run, run, found.fit)
+    _keep(run, found.fit)
     return views.explanation_view(found)
 
 
@@ -122,7 +122,7 @@ def fit(
             found = gx.fit(list(clips), effects=list(effects), effects_from=list(effects_from))
     view = views.fit_view(found)
     progress.report("writing the report", 0.95, {"fit": view})
-    _keep(key, run, found.save(run))
+    _fits[key] = _keep(run, found.save(run))
     return {"fit": view}
 
 
@@ -177,16 +177,16 @@ def simulate(run: str, values: Mapping[str, float]) -> dict[str, Any]:
 
 def _fit_of(run: str) -> gx.Fit:
     """The fit in a run's folder; read from there where the worker did not make it itself."""
-    stamp = (Path(run) / "result.json").stat().st_mtime_ns
-    key = f"{run} {stamp}"
-    if key not in _fits:
-        _keep(key, run, gx.load_run(run))
-    return _fits[key]
+    return _fits.get(_key(run)) or _keep(run, gx.load_run(run))
 
 
-def _keep(key: str, run: str, fit: gx.Fit) -> None:
+def _keep(run: str, fit: gx.Fit) -> gx.Fit:
+    """The fit, which lies in a run's folder now."""
     while len(_fits) >= _MOST_FITS:
         _fits.pop(next(iter(_fits)))
-    _fits[key] = fit
-    stamp = (Path(run) / "result.json").stat().st_mtime_ns
-    _fits[f"{run} {stamp}"] = fit
+    _fits[_key(run)] = fit
+    return fit
+
+
+def _key(run: str) -> str:
+    return f"{run} {(Path(run) / 'result.json').stat().st_mtime_ns}"

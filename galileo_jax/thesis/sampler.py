@@ -92,11 +92,9 @@ class Thesis(AbstractSampler):
         proposal_key, coin_key = jax.random.split(key)
         position = propose(proposal_key, state.position)
         proposed = log_density(position)
-        is_better = proposed >= state.log_density
         # A NaN is not better, and no coin makes it acceptable.
-        may_toss = ~jnp.isnan(proposed)
-        is_accepted = is_better | (may_toss & jax.random.bernoulli(coin_key))
-        rate = jnp.where(is_better, 1.0, jnp.where(may_toss, 0.5, 0.0))
+        rate = jnp.where(jnp.isnan(proposed), 0.0, jnp.where(proposed >= state.log_density, 1, 0.5))
+        is_accepted = jax.random.bernoulli(coin_key, rate)
         moved = ThesisState(
             jnp.where(is_accepted, position, state.position),
             jnp.where(is_accepted, proposed, state.log_density),

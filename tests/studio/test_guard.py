@@ -14,7 +14,7 @@ import pytest
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
-from galileo_jax.studio.paths import below, safe_name, videos
+from galileo_jax.studio.paths import below, clips, safe_name
 from galileo_jax.studio.session import Session
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
@@ -282,7 +282,7 @@ def test_paths_stay_below_the_folder(tmp_path):
 
 
 def test_links_out_of_the_folder_are_no_clips(folder):
-    assert "slide" in videos(folder) and "link" not in videos(folder)
+    assert "slide" in clips(folder) and "link" not in clips(folder)
 
 
 def test_a_yaml_beside_a_clip_cannot_name_files_elsewhere(tmp_path):

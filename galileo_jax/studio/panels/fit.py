@@ -21,7 +21,7 @@ def build(tab: Tab) -> None:
         if (program := program_of(session.trials.run)) is not None:
             text = f"Run {program.rpartition('/')[2]} and open it"
             parts.plain_button(text, lambda: session.open_run(is_pressed=True), "open-program")
-        elif (session.trials.run / "result.json").is_file():
+        elif session.trials.file("fit").is_file():
             ui.label("Opening the run …").classes("soft")
         parts.main_button("Fit", session.fit, tab, "fit")
         return
