@@ -23,6 +23,7 @@ from galileo_jax.observation.observation import Observation, PointPath
 BESIDE, MOST = 6, 12  # places on either side, and at most between them
 CHANCE = 1e-6  # a track has hundreds of places
 DOUBT = 1e-3  # of a leap alone, and of a path that goes on
+AT_END = 2  # places after which the path may go on
 NAMED = 4  # runs of places
 
 
@@ -57,6 +58,25 @@ def off_path(observation: Observation) -> Bool[np.ndarray, "object frame"]:
             found[i, path.frames[off]] = True
             path = path[np.setdiff1d(np.arange(len(path)), off)]
     return found
+
+
+def end_of_path(observation: Observation) -> int | None:
+    """The last frame of object 1 before one or two at the end to which its path does not lead.
+
+    Neither the parabola of the `MOST` places before nor a cubic does: too few to tell what happens
+    there, and not of the motion before. None where it leads to the last.
+    """
+    path = observation.path()
+    axes = 1 if observation.across[0].any() else len(path.place_m)
+    for last in (len(path) - AT_END, len(path) - AT_END + 1):
+        if last < MOST:
+            continue
+        near = path[last - MOST :]
+        fits = [near[:MOST].polynomial(degree, near.times_s[0]) for degree in (2, 3)]
+        rows = range(MOST, len(near))
+        if all(_is_off(near, fit, row, axes, CHANCE) for fit in fits for row in rows):
+            return int(path.frames[last - 1])
+    return None
 
 
 def _first_run(path: PointPath, axes: int) -> np.ndarray | None:
@@ -106,10 +126,10 @@ def _beside(path: PointPath, fit: LinearFit, rows: np.ndarray) -> tuple[np.ndarr
     return path.place_m[:, rows].T - powers @ fit.solution, cover
 
 
-def _is_off(path: PointPath, fit: LinearFit, row: int, axes: int) -> bool:
-    """Whether a fit does not lead to a place."""
+def _is_off(path: PointPath, fit: LinearFit, row: int, axes: int, most: float = DOUBT) -> bool:
+    """Whether a fit does not lead to a place: by errors alone with a chance of `most`."""
     beside, cover = _beside(path, fit, np.array([row]))
     freedom = axes * (len(fit.design) - fit.design.shape[1])
     left = float(np.sum(fit.left**2)) / freedom
     ratio = float(np.sum(beside**2)) / axes / (cover[0, 0] * max(left, np.finfo(float).tiny))
-    return bool(special.fdtrc(axes, freedom, ratio) < DOUBT)
+    return bool(special.fdtrc(axes, freedom, ratio) < most)

@@ -34,6 +34,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.infer_ramp import end_of_slope
 from galileo_jax.measurement.segments import blow, handling, rest
 from galileo_jax.measurement.segments.foreign_impact import stranger_frame
+from galileo_jax.measurement.segments.off_path import end_of_path
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
 from galileo_jax.measurement.segments.rate_change import rate_change
 from galileo_jax.measurement.segments.start_speed import let_go_frame
@@ -55,6 +56,7 @@ SLOPE_ENDS = (
     "comes to the end of the slope: its path goes on in another direction (scenario `ramp` has a "
     "table behind it)"
 )
+LEAVES = "leaves its path in its last frames, too few to tell how (struck, or stopped?)"
 LANDED = "comes down on the table"
 RESTS = "is at rest, and so is everything else that is still seen"
 PLACED = "is put into its place by a hand before that"
@@ -223,6 +225,8 @@ def _end_of_one(clip: Clip, observation: Observation) -> tuple[int | None, str]:
         ends.append((rest.standstill_frame(observation), STOPPED))
     if is_board:
         ends.append((end_of_slope(observation), SLOPE_ENDS))
+    if may_be_stopped:
+        ends.append((end_of_path(observation), LEAVES))
     if may_be_stopped or is_swing:
         ends.append((_blow_frame(clip, observation), STRUCK))
     found = [(frame, why) for frame, why in ends if frame is not None]
