@@ -6,14 +6,14 @@ averaged over these (motion blur) and over each pixel's area, and laid over the 
 background with the averaged coverage as its opacity. Nothing is ever rounded to a pixel.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from galileo_jax.runtime.atomic_write import replacing
+from galileo_jax.video.encode import writing_mp4
 from galileo_jax.video.synthetic.filming import (
     Camera,
     Filming,
@@ -79,45 +79,27 @@ class Frame:
     covered: tuple[float, ...]  # `[object]`, the share of each object's picture that the hand hides
 
 
-def render_clip(
+def write_clip(
     path: Path,
-    motion: Motion,
-    bodies: tuple[Body, ...],
+    frames: Iterable[Frame],
     camera: Camera,
-    ramp: Ramp | None,
     filming: Filming,
-    num_frames: int,
-    *,
-    seed: int,
     on_frame: Callable[[], object] = lambda: None,
 ) -> np.ndarray:
-    """Writes the clip to `path` (mp4, MPEG-4 part 2), whole or not at all.
+    """Writes frames to `path`, whole or not at all; `on_frame` is called after each (progress).
 
-    `on_frame` is called after each frame (a progress bar). The codec moves what it shows by
-    0.01 to 0.02 px RMS; a file of MJPEG would be four times as large.
+    The codec moves what it shows by 0.01 to 0.02 px RMS; a file of MJPEG would be four times as
+    large.
 
     Returns:
       `[object, frame]`, the share of each object that the hand hides, 0 to 1.
-
-    Raises:
-      OSError: the file cannot be written.
     """
     covered = []
-    with replacing(path) as temporary:
-        codec = cv2.VideoWriter.fourcc(*"mp4v")
-        fps = filming.written_fps or filming.fps
-        writer = cv2.VideoWriter(str(temporary), codec, fps, camera.size_px)
-        if not writer.isOpened():
-            raise OSError(f"{path}: no video can be written there")
-        try:
-            for frame in render_frames(
-                motion, bodies, camera, ramp, filming, num_frames, seed=seed
-            ):
-                writer.write(frame.picture)
-                covered.append(frame.covered)
-                on_frame()
-        finally:
-            writer.release()
+    with writing_mp4(path, filming.written_fps or filming.fps, camera.size_px) as writer:
+        for frame in frames:
+            writer.write(frame.picture)
+            covered.append(frame.covered)
+            on_frame()
     return np.array(covered).T
 
 
