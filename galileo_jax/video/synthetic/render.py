@@ -18,6 +18,7 @@ from galileo_jax.video.synthetic.filming import (
     Camera,
     Filming,
     Hand,
+    placed,
     project,
     sway,
     turned_camera,
@@ -136,7 +137,7 @@ def render_frames(
         layers = []
         for body, texture in enumerate(textures):
             to_metres = _texels_to_metres(_middle(texture), texels_per_metre)
-            where = [_pose(position[body], pitch[body]) @ to_metres for position, pitch in poses]
+            where = [placed(position[body], pitch[body]) @ to_metres for position, pitch in poses]
             layers.append(_layer(texture, where, camera))
         picture = backdrop.copy()
         for layer in filter(None, layers):
@@ -197,7 +198,7 @@ def _lay(
     to_rectangle = np.array(
         [[(right - left) / width, 0, left], [0, (bottom - top) / height, top], [0, 0, 1]]
     )
-    matrix = to_canvas @ _pose(np.zeros(2), turn_rad) @ to_rectangle
+    matrix = to_canvas @ placed((0.0, 0.0), turn_rad) @ to_rectangle
     cv2.warpPerspective(
         texture,
         matrix,
@@ -261,15 +262,10 @@ def _texels_to_metres(
     return np.array([[scale, 0, -x * scale], [0, -scale, y * scale], [0, 0, 1]])
 
 
-def _pose(position_m: np.ndarray, pitch_rad: float) -> np.ndarray:
-    cos, sin = np.cos(pitch_rad), np.sin(pitch_rad)
-    return np.array([[cos, -sin, position_m[0]], [sin, cos, position_m[1]], [0, 0, 1]])
-
-
 def _hand_pose(hand: Hand, held_m: np.ndarray, time_s: float) -> np.ndarray:
     drawn_back_m = hand.speed_m_s * max(0.0, time_s - hand.leave_s)
     arm = np.array([np.cos(hand.angle_rad), np.sin(hand.angle_rad)])
-    return _pose(held_m + hand.offset_m + drawn_back_m * arm, hand.angle_rad)
+    return placed(held_m + hand.offset_m + drawn_back_m * arm, hand.angle_rad)
 
 
 def _covered(layer: Layer | None, hand: Layer, size_px: tuple[int, int]) -> float:
