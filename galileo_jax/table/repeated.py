@@ -198,13 +198,11 @@ def without_stand_ins(motion: Motion) -> Motion:
             there = which.ravel() == value
             others = steps[~there[1:] & ~there[:-1]]
             is_near = np.append(True, steps <= FAR * others.max(initial=0.0))
-            is_new = np.append(True, there[1:] != there[:-1])
-            runs = np.split(np.arange(len(seen)), np.flatnonzero(is_new)[1:])
-            runs = [run for run in runs if there[run[0]]]
+            runs = stretches(there)
             if not others.any() or (len(runs) < 2 and not set(each[value]) <= STAND_INS):
                 continue
             for run in runs:
-                sides = [at for at in (run[0], run[-1] + 1) if 0 < at < len(seen)]
+                sides = [at for at in (run.start, run.stop) if 0 < at < len(seen)]
                 if not is_near[sides].any() and (len(sides) > 1 or len(runs) > 1):
                     found[body][:, seen[run]] = np.nan
                     values.add(", ".join(f"{one:g}" for one in each[value]))
