@@ -24,16 +24,15 @@ def check_objects(file: ClipFile, fail: Any) -> None:
     """What takes several values of the yaml to judge."""
     scenario = SCENARIOS[file.scenario]
     this = f"scenario {file.scenario} ({scenario.meaning})"
-    has_ramp = scenario.has_ramp and scenario.angle_deg is None
     fewest, most = scenario.num_objects
-    if has_ramp and "ramp_angle_deg" not in file.model_fields_set:
+    if scenario.is_sloped and "ramp_angle_deg" not in file.model_fields_set:
         fail(
             "ramp_angle_deg",
             f"missing; scenario {file.scenario} needs it, in degrees, or null where it is to be "
             "found from the path",
         )
     # Several objects may slide beside a ramp.
-    if most == 1 and not has_ramp and (angle := file.ramp_angle_deg) is not None:
+    if most == 1 and not scenario.is_sloped and (angle := file.ramp_angle_deg) is not None:
         fail("ramp_angle_deg", f"{angle:g} given; {this} has no ramp; leave it out")
     for key in (key for other in SCENARIOS.values() for key in other.keys):
         is_given = getattr(file, key) != ClipFile.model_fields[key].default
@@ -90,11 +89,9 @@ def check_against_source(clip: Clip, observation: Observation | None, fail: Any)
                 f"{clip.frame_count} frames (0 to {clip.frame_count - 1})",
             )
         check_frames(key, item, clip, fail)
-        if item.point_px is not None and clip.frame_size_px is not None:
-            _check_in_frame(f"{key}.point_px", item.point_px, clip.frame_size_px, 0, fail)
-    if clip.origin_px is not None and clip.frame_size_px is not None:
-        # The foot may lie outside the picture, but not by more than its own size.
-        _check_in_frame("origin_px", clip.origin_px, clip.frame_size_px, 1, fail)
+        _check_in_frame(f"{key}.point_px", item.point_px, clip, fail)
+    # The foot may lie outside the picture, but not by more than its own size.
+    _check_in_frame("origin_px", clip.origin_px, clip, fail, margin=1)
     check_walls(clip, observation, fail)
     places = _first_positions(observation) if observation else placement.centres_from_pixels(clip)
     for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, places)):
@@ -125,10 +122,9 @@ def check_walls(clip: Clip, observation: Observation | None, fail: Any) -> None:
                 "in metres, but pixels_per_metre is null; from_px and to_px expected, or the scale",
             )
         if wall.is_in_pixels:
-            assert clip.frame_size_px is not None
             for end in ("from_px", "to_px"):
                 # A wall may go on beside the picture, but not by more than the picture's own size.
-                _check_in_frame(f"{key}.{end}", getattr(wall, end), clip.frame_size_px, 1, fail)
+                _check_in_frame(f"{key}.{end}", getattr(wall, end), clip, fail, margin=1)
             continue
         places = _first_positions(observation) if observation else {}
         for item in clip.objects:
@@ -159,8 +155,7 @@ def check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:
                 f"frame {frame} is not after the first that is used ({first}) and up to the last "
                 f"({last})",
             )
-        if clip.frame_size_px is not None:
-            _check_in_frame(f"{key}.corrections[{n}]", (x, y), clip.frame_size_px, 0, fail)
+        _check_in_frame(f"{key}.corrections[{n}]", (x, y), clip, fail)
 
 
 def _check_uncertainties(clip: Clip, fail: Any) -> None:
@@ -178,10 +173,13 @@ def _check_uncertainties(clip: Clip, fail: Any) -> None:
 
 
 def _check_in_frame(
-    key: str, point: tuple[float, float], size_px: tuple[int, int], margin: int, fail: Any
+    key: str, point: tuple[float, float] | None, clip: Clip, fail: Any, margin: int = 0
 ) -> None:
-    width, height = size_px
-    sides = zip(point, size_px, strict=True)
+    """Refuses a marked point that is further outside than so many times the picture's size."""
+    if point is None or clip.frame_size_px is None:
+        return
+    width, height = clip.frame_size_px
+    sides = zip(point, clip.frame_size_px, strict=True)
     if not all(-margin * size <= at < (1 + margin) * size for at, size in sides):
         far = "far " if margin else ""
         fail(key, f"{list(point)} is {far}outside the frame of {width} x {height} pixels")

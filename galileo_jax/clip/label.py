@@ -10,13 +10,7 @@ import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX, LEVELS, Declaration
 from galileo_jax.clip.file_kinds import is_track, is_yaml
-from galileo_jax.clip.load import (
-    check_belongs,
-    check_clip,
-    find_yaml,
-    has_yaml,
-    with_unused,
-)
+from galileo_jax.clip.load import check_belongs, check_clip, find_yaml, has_yaml, with_unused
 from galileo_jax.clip.picture_plane import PicturePlane, nearby_planes, picture_plane
 from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile
 from galileo_jax.clip.sources import source_of

@@ -284,12 +284,7 @@ def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:
 
 
 def proposed_yaml(
-    path: Path,
-    table: TrackTable,
-    scenario: str,
-    fps: float | None,
-    motions: int,
-    has_floor: bool,
+    path: Path, table: TrackTable, scenario: str, fps: float | None, motions: int, has_floor: bool
 ) -> str:
     """The clip's yaml; what nobody can know but the user is a comment.
 

@@ -100,9 +100,8 @@ def picture_plane(clip: Clip, origin_px: Sequence[float] | np.ndarray) -> Pictur
             "middle_px": ((width - 1) / 2, (height - 1) / 2),
             "unit_px": math.hypot(width, height) / 2,
         }
-    sign = 1.0 if clip.direction == "right" else -1.0
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
-    plane = PicturePlane((float(origin_px[0]), float(origin_px[1])), sign, scale, **lens)
+    plane = PicturePlane((float(origin_px[0]), float(origin_px[1])), clip.sign, scale, **lens)
     if clip.rectangle is None:
         return plane
     import cv2

@@ -95,8 +95,7 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     origin = clip.origin_px if in_pixels else clip.track_origin
     has_origin = clip.is_own_track or origin is not None
     scenario = SCENARIOS[clip.scenario]
-    is_on_ramp = scenario.has_ramp and scenario.angle_deg is None and has_origin
-    is_on_ramp &= clip.ramp_angle_deg is not None
+    is_on_ramp = scenario.is_sloped and has_origin and clip.ramp_angle_deg is not None
     mend, mend_pair = MEND["own csv" if clip.is_own_track else "pixels" if in_pixels else "lengths"]
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     placed = [

@@ -119,6 +119,16 @@ class ClipFile(BaseModel):
     turning: fields.Yes = False
     objects: tuple[ClipObject, ...]
 
+    @property
+    def has_floor(self) -> bool:
+        """Whether the object may reach a floor."""
+        return self.floor is not None and self.floor is not False
+
+    @property
+    def sign(self) -> float:
+        """1 where x, along the travel, is to the right in the picture, else -1."""
+        return 1.0 if self.direction == "right" else -1.0
+
 
 class Clip(ClipFile):
     """A loaded and checked clip.
@@ -196,8 +206,3 @@ class Clip(ClipFile):
     def is_camera_plain(self) -> bool:
         """Whether pixels become metres by a scale alone."""
         return self.rectangle is None and self.lens is None
-
-    @property
-    def has_floor(self) -> bool:
-        """Whether the object may reach a floor."""
-        return self.floor is not None and self.floor is not False

@@ -177,11 +177,7 @@ def in_plane(of: DeclaredTrack, table: TrackTable) -> tuple[TrackTable, tuple[st
 
 
 def along_line(
-    of: DeclaredTrack,
-    table: TrackTable,
-    times: np.ndarray,
-    way_m: np.ndarray,
-    rounding_m: float,
+    of: DeclaredTrack, table: TrackTable, times: np.ndarray, way_m: np.ndarray, rounding_m: float
 ) -> tuple[Observation, tuple[str, ...]]:
     """The one coordinate of a table, `[object, row]`, m, as a motion along the scenario's line.
 
@@ -244,8 +240,7 @@ def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
         if scenario.up_shows != "bend":
             return 1
         # Between bounces it falls in most rows, though not in most parabolas.
-        has_floor = file.floor is not None and file.floor is not False
-        falls = np.diff(way[seen], 2) if has_floor else accelerations(times[seen], way[seen])
+        falls = np.diff(way[seen], 2) if file.has_floor else accelerations(times[seen], way[seen])
         return -_sign(falls) or 1
     gone = way[seen] - way[seen][0]
     has_turned = abs(gone[-1]) < 0.5 * np.abs(gone).max()

@@ -37,7 +37,7 @@ from galileo_jax.numerics.units import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError, named
 from galileo_jax.table.clock import usual_step
-from galileo_jax.table.grid import read_cells
+from galileo_jax.table.grid import cells_of
 from galileo_jax.table.pandas_h5 import is_hdf5
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
@@ -287,7 +287,7 @@ def _is_ours(path: Path) -> bool:
         head = [line for line in content[:65_536].replace(b"\0", b"").splitlines() if line.strip()]
         if not any(OURS.search(line.decode("ascii", "ignore")) for line in head[:3]):
             return False
-        titles = [title.lower() for title in read_cells(path)[0][1]]
+        titles = [title.lower() for title in cells_of(content)[0][1]]
     sides = {axis for axis in "xy" for one in titles if f"_{one}".endswith(f"_{axis}_m")}
     is_meant = all(any(map(one.fullmatch, titles)) for one in (OURS, OUR_BODY))
     return len(sides) != 1 and is_meant

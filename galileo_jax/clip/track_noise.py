@@ -146,8 +146,7 @@ def space_noise_m(name: str, times_s: np.ndarray, position_m: np.ndarray) -> tup
     for first in range(len(seen) - size + 1):
         part = slice(first, first + size)
         since = (times[part] - times[first]) / (times[first + size - 1] - times[first])
-        design = np.vander(since, TERMS)
-        left = places[:, part].T - design @ np.linalg.lstsq(design, places[:, part].T)[0]
+        left = polynomial(since, places[:, part].T, TERMS - 1).left
         way = places[:, first + size - 1] - places[:, first]
         along = left @ (way / max(float(np.linalg.norm(way)), np.finfo(float).tiny))
         free = size - TERMS

@@ -123,10 +123,8 @@ def film_ramp(
     )
     bodies = tuple(_body(each) for each in truth.objects)
     ramp = synthetic.Ramp(truth.angle_rad, truth.release_m + RAMP_ABOVE_M)
-    on_frame = reported(num_frames)
-    covered = synthetic.render_clip(
-        out, path, bodies, camera, ramp, filming, num_frames, seed=seed, on_frame=on_frame
-    )
+    film = synthetic.render_frames(path, bodies, camera, ramp, filming, num_frames, seed=seed)
+    covered = synthetic.write_clip(out, film, camera, filming, reported(num_frames))
     hand = filming.hand
     with_hand = np.flatnonzero(covered.max(axis=0))
     return {
@@ -157,6 +155,6 @@ def reported(num_frames: int) -> Callable[[], None]:
 
 def _body(declared: ClipObject) -> synthetic.Body:
     """What rolls is a disc from the side."""
-    if declared.roll_inertia is not None:
-        return synthetic.Body("sphere", extents(declared)[:1])
-    return synthetic.Body(declared.shape, declared.size_m or ())
+    half_length, half_height = extents(declared)
+    is_round = declared.roll_inertia is not None or declared.shape in ("sphere", "torus")
+    return synthetic.Body((2 * half_length, 2 * half_height), is_round)

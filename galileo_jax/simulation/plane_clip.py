@@ -97,12 +97,11 @@ def _write(settings: Settings, truth: PlaneTruth, looks: np.random.Generator, ou
         if scene.is_level:
             path = _with_run_up(motion)
         # From above a puck is a disc, and all else is a ball.
-        bodies = tuple(synthetic.Body("sphere", (radius,)) for radius in scene.half_length_m)
+        bodies = tuple(synthetic.Body((2 * r, 2 * r), is_round=True) for r in scene.half_length_m)
         count, seed = len(frames.times_s), settings.seed
         filming = filming_of(settings, declared, count, looks)
-        synthetic.render_clip(
-            out, path, bodies, camera, None, filming, count, seed=seed, on_frame=reported(count)
-        )
+        film = synthetic.render_frames(path, bodies, camera, None, filming, count, seed=seed)
+        synthetic.write_clip(out, film, camera, filming, reported(count))
     write_yaml_and_truth(out, content, record)
 
 

@@ -19,6 +19,7 @@ from galileo_jax.table.heading import one_below_the_other, split_heading
 from galileo_jax.table.numbers import Numbers
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import (
+    Motion,
     each_place_once,
     motion_starts,
     not_pasted,
@@ -71,57 +72,55 @@ def read_table(path: Path, fps: float | None = None, num_bodies: int = 1) -> Tra
 
 
 def _table(columns: Columns) -> TrackTable:
-    lines = [line for line, _ in columns.heading.body]
+    lines = np.array([line for line, _ in columns.heading.body])
     clock, resolution_s = _clock(columns, lines)
-    is_in_frames = not columns.of("time")
+    is_in_frames, is_counted, ids = not columns.of("time"), clock is None, columns.of("object")
     unit = _unit(columns)
     names, axes, places, resolution = _places(columns, unit)
-    warnings, ids = list(columns.warnings), columns.of("object")
     if ids:
         if clock is None:
             raise InputError("a column of particles needs one of frames or times beside it")
         names, places, clock = _by_object(columns, ids[0], clock, places[0])
-    elif clock is not None:
-        new, said = not_pasted(clock, places, lines)
-        clock, places, lines = clock[new], places[..., new], [lines[row] for row in new]
-        warnings += said
+    elif clock is None:
+        clock = np.arange(places.shape[-1], dtype=float)
+    motion = Motion(clock, places, lines, columns.warnings)
+    if not ids and not is_counted:
+        motion = not_pasted(motion)
         if not is_in_frames:
-            if _counts_film_ms(columns, columns.of("time")[0]):
-                warnings.append("times without a unit are taken as milliseconds, as of a film")
-            if clock.size > 1 and (np.diff(clock) < 0).all():
-                clock, places, lines = clock[::-1] - clock[-1], places[..., ::-1], lines[::-1]
-                warnings.append("the last row comes first: read from the end")
-            clock, said = unrounded(clock, places, resolution_s)
-            warnings += said
-        clock, places, said = without_repeats(clock, places, lines)
-        warnings += said
+            motion = unrounded(_forward(columns, motion), resolution_s)
+        motion = without_repeats(motion)
+    if not ids:
+        motion = each_place_once(without_stand_ins(motion), resolution)
+        motion = without_copies(motion, resolution)
     is_seen_by_program = bool(columns.of("likelihood"))
     unit = unit or ("px" if is_seen_by_program else None)
-    is_counted = clock is None
-    clock = np.arange(places.shape[-1], dtype=float) if clock is None else clock
-    if not ids:
-        places, said = without_stand_ins(places, lines)
-        warnings += said
-        new, said = each_place_once(places, resolution, lines)
-        clock, places, lines = clock[new], places[..., new], [lines[row] for row in new]
-        warnings += said
-        places, said = without_copies(clock, places, resolution, lines)
-        warnings += said
     return TrackTable(
         names=names,
-        position=places,
-        clock=clock,
+        position=motion.places,
+        clock=motion.clock,
         is_in_frames=is_in_frames,
         axes=axes,
         is_counted=is_counted,
         frame_s=columns.heading.frame_s,
         unit=unit,
         resolution=resolution,
-        starts=motion_starts(clock),
+        starts=motion_starts(motion.clock),
         y_axis=_y_axis(columns, axes, unit == "px" and is_seen_by_program),
         columns=_listed(columns),
-        warnings=tuple(warnings),
+        warnings=motion.said,
     )
+
+
+def _forward(columns: Columns, motion: Motion) -> Motion:
+    """The rows in the order of their times, and what is said of these."""
+    if _counts_film_ms(columns, columns.of("time")[0]):
+        said = "times without a unit are taken as milliseconds, as of a film"
+        motion = replace(motion, said=(*motion.said, said))
+    count = motion.clock.size
+    if count < 2 or not (np.diff(motion.clock) < 0).all():
+        return motion
+    motion = motion.rows(np.arange(count)[::-1], "the last row comes first: read from the end")
+    return replace(motion, clock=motion.clock - motion.clock[0])
 
 
 def _y_axis(
@@ -145,7 +144,7 @@ def _listed(columns: Columns) -> tuple[Column, ...]:
     return tuple(found)
 
 
-def _clock(columns: Columns, lines: Sequence[int]) -> tuple[np.ndarray | None, float]:
+def _clock(columns: Columns, lines: np.ndarray) -> tuple[np.ndarray | None, float]:
     """Times `[row]`, s, and their resolution, or else frames and 0; None of neither."""
     role = "time" if columns.of("time") else "frame"
     _check_one_clock(columns)

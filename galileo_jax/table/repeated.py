@@ -1,9 +1,11 @@
 """Rows with the same time or a copied place, and times that begin anew: motions in one table."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.numerics.runs import stretches
@@ -23,6 +25,32 @@ GOES_ON = 0.75
 """Of a step: a body goes on so far in a row, or it begins, ends or turns there by itself."""
 
 
+@dataclass(frozen=True)
+class Motion:
+    """The rows of a table, and what was done to them."""
+
+    clock: Float[np.ndarray, " row"]  # s, or frames
+    places: Float[np.ndarray, "object axis row"]  # in any unit
+    lines: Int[np.ndarray, " row"]  # of the file
+    said: tuple[str, ...] = ()  # one line each
+
+    def rows(self, which: np.ndarray, *said: str) -> "Motion":
+        """Some of them."""
+        found = self.clock[which], self.places[..., which], self.lines[which]
+        return Motion(*found, (*self.said, *said))
+
+    def unseen_but(self, places: np.ndarray, why: str) -> "Motion":
+        """With NaN for some places, and a line that lists their rows and says why."""
+        is_less = (np.isnan(places) & np.isfinite(self.places)).any(axis=(0, 1))
+        lines = self.lines[is_less]
+        if not lines.size:
+            return self
+        more = f" and {lines.size - 5} more" if lines.size > 5 else ""
+        listed = ", ".join(f"line {line}" for line in lines[:5]) + more
+        said = f"{listed}: {why} as not seen"
+        return replace(self, places=places, said=(*self.said, said))
+
+
 def motion_starts(clock: np.ndarray) -> tuple[int, ...]:
     """The rows at which motions begin: the first, and those where a clock falls back to its start.
 
@@ -39,18 +67,17 @@ def motion_starts(clock: np.ndarray) -> tuple[int, ...]:
     return tuple(starts) if is_back.all() and goes_on.all() else (0,)
 
 
-def unrounded(
-    times: np.ndarray, places: np.ndarray, resolution_s: float
-) -> tuple[np.ndarray, list[str]]:
-    """Times `[row]` that are printed more coarsely than rows follow each other, and what was done.
+def unrounded(motion: Motion, resolution_s: float) -> Motion:
+    """With even steps for times that are printed more coarsely than rows follow each other.
 
     Where most of the rows at one time have other places, and even steps agree with all the times to
     the last place that is printed, these steps are used: those of a usual frame rate if they do.
     """
+    times = motion.clock
     is_repeat = np.diff(times) == 0
-    goes_on = (np.diff(places, axis=-1) != 0).any(axis=(0, 1))
+    goes_on = (np.diff(motion.places, axis=-1) != 0).any(axis=(0, 1))
     if times.size < LEAST_ROWS or not is_repeat.any() or goes_on[is_repeat].mean() < 0.5:
-        return times, []
+        return motion
     rows = np.arange(times.size)
     told = float(np.polyfit(rows, times, 1)[0])
     usual = min((1 / fps for fps in COMMON_FPS), key=lambda step: abs(step - told))
@@ -58,23 +85,22 @@ def unrounded(
         each for each in (usual, told) if np.ptp(times - each * rows) <= ROUNDED * resolution_s
     )
     if (step := next(agree, 0.0)) <= 0:
-        return times, []
+        return motion
     said = (
         f"times in steps of {resolution_s:g} s stand in several rows; even steps of "
         f"{step:.3g} s agree with all of them and are used"
     )
-    return step * rows, [said]
+    return replace(motion, clock=step * rows, said=(*motion.said, said))
 
 
-def without_repeats(
-    times: np.ndarray, places: np.ndarray, lines: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Times `[row]` and places `[object, axis, row]` with each time once, and what was done.
+def without_repeats(motion: Motion) -> Motion:
+    """Each time once.
 
     Rows that follow each other at one time count once where they are equal, else as their mean.
     """
+    times, places = motion.clock, motion.places
     if times.size < 2 or not (np.diff(times) == 0).any():
-        return times, places, []
+        return motion
     is_first = np.concatenate([[True], np.diff(times) != 0])
     group, starts = np.cumsum(is_first) - 1, np.flatnonzero(is_first)
     seen = np.isfinite(places)
@@ -84,24 +110,23 @@ def without_repeats(
     differs = seen & (places != mean[..., group])
     repeats = np.bincount(group) > 1
     num_mixed = int(np.unique(group[differs.any(axis=(0, 1))]).size)
-    first = lines[int(starts[int(repeats.argmax())])]
+    first = motion.lines[starts[int(repeats.argmax())]]
     how = (
         f"{num_mixed} of them with other places, of which the mean is used"
         if num_mixed
         else "with the same places, which count once"
     )
     said = f"line {first}: {int(repeats.sum())} times stand in several rows, {how}"
-    return times[starts], mean, [said]
+    return replace(motion.rows(starts, said), places=mean)
 
 
-def not_pasted(
-    clock: np.ndarray, places: np.ndarray, lines: Sequence[int]
-) -> tuple[np.ndarray, list[str]]:
-    """The rows that are in a table for the first time, counted from 0, and what was done.
+def not_pasted(motion: Motion) -> Motion:
+    """The rows that are in a table for the first time.
 
     Rows from which the clock has gone back were pasted again where they are rows of before to the
     last digit, until the table ends, the clock goes back once more, or goes on beyond all before.
     """
+    clock, places = motion.clock, motion.places
     is_new = np.ones(len(clock), bool)
     starts = (1 + np.flatnonzero(np.diff(clock) < 0)).tolist()
     rows = [row.tobytes() for row in np.vstack([clock, places.reshape(-1, len(clock))]).T + 0.0]
@@ -110,79 +135,62 @@ def not_pasted(
         end = next((row for row in range(start, stop) if rows[row] not in known), stop)
         is_new[start:end] = end < stop and clock[end] <= latest[start - 1]
         known.update(rows[end:stop])
-    new = np.flatnonzero(is_new)
     if is_new.all():
-        return new, []
-    first, count = lines[int(is_new.argmin())], len(clock) - len(new)
-    return new, [f"line {first}: {count} rows are rows of before once more; left out"]
+        return motion
+    first, count = motion.lines[is_new.argmin()], np.count_nonzero(~is_new)
+    said = f"line {first}: {count} rows are rows of before once more; left out"
+    return motion.rows(np.flatnonzero(is_new), said)
 
 
-def each_place_once(
-    places: np.ndarray, resolution: Sequence[float], lines: Sequence[int]
-) -> tuple[np.ndarray, list[str]]:
-    """The rows, counted from 0, that show something new, and what was done.
+def each_place_once(motion: Motion, resolution: Sequence[float]) -> Motion:
+    """The rows that show something new; `resolution` is that of each axis.
 
     Pictures that are in a film twice have the same place in two rows: the rule for such pictures
     (`video.stamps`), with the last place printed for a grey level. Of a few that are found here and
     there `without_copies` knows more.
-
-    Args:
-      places: `[object, axis, row]`, in any unit.
-      resolution: of each axis.
-      lines: of the rows in the file.
     """
-    steps = np.diff(places / np.reshape(resolution, (-1, 1)), axis=-1)
+    steps = np.diff(motion.places / np.reshape(resolution, (-1, 1)), axis=-1)
     change = np.append(0.0, np.nan_to_num(np.linalg.norm(steps, axis=(0, 1))))
     is_same = np.append(False, (steps == 0).all(axis=(0, 1)))
     is_repeat = repeats(change) & is_same
     new, total = np.flatnonzero(~is_repeat), len(change)
     if total - len(new) < REPEATED_SHARE * total:
-        return np.arange(total), []
-    first = lines[int(is_repeat.argmax())]
-    return new, [
-        f"line {first}: {total - len(new)} of {total} rows repeat the places of the one before"
-        f"{each_times(total, len(new))}: left out, and row numbers count the others"
-    ]
+        return motion
+    return motion.rows(
+        new,
+        f"line {motion.lines[is_repeat.argmax()]}: {total - len(new)} of {total} rows repeat the "
+        f"places of the one before{each_times(total, len(new))}: left out, and row numbers count "
+        "the others",
+    )
 
 
-def without_copies(
-    clock: np.ndarray,
-    places: np.ndarray,
-    resolution: Sequence[float],
-    lines: Sequence[int],
-) -> tuple[np.ndarray, list[str]]:
-    """Places `[object, axis, row]`, NaN where they were copied from a neighbour, and what was done.
+def without_copies(motion: Motion, resolution: Sequence[float]) -> Motion:
+    """With NaN for places that were copied from a neighbour; the clock rises.
 
     A program that loses a body writes its last place once more, and one that begins late its first
     place before. In a moving body's track a coordinate that is the same in two rows to the last of
     many digits is such a copy where a parabola through three rows beside them leads to one of the
-    two and not to the other.
-
-    Args:
-      clock: `[row]`, rising.
-      places: in any unit.
-      resolution: of each axis.
-      lines: of the rows in the file.
+    two and not to the other. `resolution` is that of each axis.
     """
-    found = places.copy()
-    for body, axis in np.ndindex(places.shape[:2]):
-        values = places[body, axis]
+    found = motion.places.copy()
+    for body, axis in np.ndindex(found.shape[:2]):
+        values = motion.places[body, axis]
         for pair in stretches(np.diff(values) == 0):
             run = np.arange(pair.start, pair.stop + 1)
-            copies = _copies(clock, values, run, MANY_DIGITS * resolution[axis])
+            copies = _copies(motion.clock, values, run, MANY_DIGITS * resolution[axis])
             found[body][:, copies] = np.nan
     why = "the place of the row beside it, to the last digit, while it moves: a copy, which counts"
-    return found, _unseen(places, found, lines, why)
+    return motion.unseen_but(found, why)
 
 
-def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndarray, list[str]]:
-    """Places `[object, axis, row]`, NaN where a number stands for "not seen", and what was done.
+def without_stand_ins(motion: Motion) -> Motion:
+    """With NaN for places where a number stands for "not seen".
 
     Such a place is 0, -1 or -9999 on all axes, or comes again and again to the last digit, and the
     steps to and from it are longer than any other. At an end alone it may be a rest.
     """
-    found, values = places.copy(), set()
-    for body, place in enumerate(places):
+    found, values = motion.places.copy(), set()
+    for body, place in enumerate(motion.places):
         seen = np.flatnonzero(np.isfinite(place).all(axis=0))
         steps = np.linalg.norm(np.diff(place[:, seen]), axis=0) / np.diff(seen)
         each, which = np.unique(place[:, seen].T, axis=0, return_inverse=True)
@@ -190,26 +198,16 @@ def without_stand_ins(places: np.ndarray, lines: Sequence[int]) -> tuple[np.ndar
             there = which.ravel() == value
             others = steps[~there[1:] & ~there[:-1]]
             is_near = np.append(True, steps <= FAR * others.max(initial=0.0))
-            is_new = np.append(True, there[1:] != there[:-1])
-            runs = np.split(np.arange(len(seen)), np.flatnonzero(is_new)[1:])
-            runs = [run for run in runs if there[run[0]]]
+            runs = stretches(there)
             if not others.any() or (len(runs) < 2 and not set(each[value]) <= STAND_INS):
                 continue
             for run in runs:
-                sides = [at for at in (run[0], run[-1] + 1) if 0 < at < len(seen)]
+                sides = [at for at in (run.start, run.stop) if 0 < at < len(seen)]
                 if not is_near[sides].any() and (len(sides) > 1 or len(runs) > 1):
                     found[body][:, seen[run]] = np.nan
                     values.add(", ".join(f"{one:g}" for one in each[value]))
     why = f"{' and '.join(sorted(values))}, far from all other rows, counts"
-    return found, _unseen(places, found, lines, why)
-
-
-def _unseen(places: np.ndarray, found: np.ndarray, lines: Sequence[int], why: str) -> list[str]:
-    """A line that lists the rows of which places were left out, and says why; none: none were."""
-    rows = np.flatnonzero((np.isnan(found) & np.isfinite(places)).any(axis=(0, 1)))
-    more = f" and {rows.size - 5} more" if rows.size > 5 else ""
-    listed = ", ".join(f"line {lines[row]}" for row in rows[:5]) + more
-    return [f"{listed}: {why} as not seen"] if rows.size else []
+    return motion.unseen_but(found, why)
 
 
 def _copies(clock: np.ndarray, values: np.ndarray, run: np.ndarray, least: float) -> np.ndarray:

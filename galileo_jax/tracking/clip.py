@@ -17,7 +17,8 @@ from galileo_jax.tracking.detect import CameraMovesError, Mover, find_movers, fi
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import OpenFrames
-from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.pose import corners
+from galileo_jax.tracking.silhouette import way_px
 from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import WINDOW_PX, Outline, grey
 from galileo_jax.tracking.track import Track
@@ -101,8 +102,9 @@ def _seen_outline(
     """
     found: list[tuple[float, float]] = []
     for mover in movers:
-        own = (mover.places_px + mover.way_px[frame] - point_px) @ rotation(outline.angle_rad)
-        width, height = 2 * np.minimum(-own.min(axis=0), own.max(axis=0))
+        around = mover.places_px + mover.way_px[frame] - point_px
+        low, high = corners(around, outline.angle_rad)
+        width, height = 2 * np.minimum(-low, high)
         if min(width, height) > WINDOW_PX:  # NaN, where it is not seen, compares False
             found.append((float(width), float(height)))
     if not found:
@@ -173,10 +175,7 @@ def _check_followed(clip: Clip, marked: Clip, track: Track, movers: Sequence[Mov
         both = track.is_visible[i] & np.isfinite(mover.way_px[:, 0])
         if not both.any():
             continue
-        moves, goes = (
-            float(np.hypot(*np.ptp(way[both], axis=0)))
-            for way in (mover.way_px, track.position_px[i])
-        )
+        moves, goes = way_px(mover.way_px[both]), way_px(track.position_px[i][both])
         if moves > WINDOW_PX and goes < FOLLOWS * moves:
             raise InputError(
                 f"{clip.path}: objects ({item.name}): point_px: missing, and what was found there "
@@ -215,8 +214,7 @@ def _image_angle_rad(clip: Clip, item: ClipObject) -> float:
     if clip.scenario == "ramp":
         if clip.origin_px is None or item.point_px is None:
             return 0.0
-        along = 1.0 if clip.direction == "right" else -1.0
-        if along * (item.point_px[0] - clip.origin_px[0]) > 0:
+        if clip.sign * (item.point_px[0] - clip.origin_px[0]) > 0:
             return 0.0
     return _ramp_angle_rad(clip)
 
@@ -225,4 +223,4 @@ def _ramp_angle_rad(clip: Clip) -> float:
     """How the ramp's surface is turned in the image, clockwise positive; 0 without a ramp."""
     if not SCENARIOS[clip.scenario].has_ramp or clip.ramp_angle_deg is None:
         return 0.0
-    return math.radians(clip.ramp_angle_deg) * (1 if clip.direction == "right" else -1)
+    return clip.sign * math.radians(clip.ramp_angle_deg)

@@ -20,7 +20,7 @@ from galileo_jax.numerics.least_squares import polynomial
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.features import PYRAMID_LEVELS, follow_points, rigid_motion
 from galileo_jax.tracking.picture import OpenFrames, some_frames
-from galileo_jax.tracking.pose import patch_at, rotation
+from galileo_jax.tracking.pose import corners, patch_at, rotation
 from galileo_jax.tracking.silhouette import Path, differences, paths_of
 from galileo_jax.tracking.template import Outline, grey
 
@@ -376,9 +376,8 @@ def _last_seen(path: np.ndarray) -> np.ndarray:
 
 def _middle(places: np.ndarray, angle_rad: float) -> tuple[float, float]:
     """The middle of the smallest rectangle, with sides along the axes, around `places`."""
-    turn = rotation(angle_rad)
-    own = places @ turn
-    x, y = turn @ ((own.min(axis=0) + own.max(axis=0)) / 2)
+    low, high = corners(places, angle_rad)
+    x, y = rotation(angle_rad) @ ((low + high) / 2)
     return float(x), float(y)
 
 
@@ -393,8 +392,7 @@ def fit_outline(image: np.ndarray, places: np.ndarray, outline: Outline) -> tupl
     assert outline.size_px is not None
     size = np.array(outline.size_px)
     turn = rotation(outline.angle_rad)
-    own = places @ turn
-    low, high = own.min(axis=0), own.max(axis=0)
+    low, high = corners(places, outline.angle_rad)
     middle = (low + high) / 2
     slack = np.maximum((size - (high - low)) / 2, 0) + 1.5
     radius = int(np.ceil(size.max() / 2 + slack.max())) + 2

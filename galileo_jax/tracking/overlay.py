@@ -11,6 +11,7 @@ from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.track import Track
+from galileo_jax.video.encode import writing_mp4
 
 COLOURS = ((40, 40, 255), (255, 160, 0), (0, 200, 0), (220, 0, 220))  # BGR, by object
 OUTLINE = (255, 255, 255)
@@ -29,17 +30,11 @@ def write_overlay_video(
     """Writes the frames with each object's place, turn and path so far (mp4, real time)."""
     fps = 1 / float(np.median(np.diff(track.times_s)))
     scale = _enlargement(track)
-    size = tuple(scale * n for n in track.frame_size_px)
-    with replacing(path) as temporary:
-        writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), fps, size)
-        if not writer.isOpened():
-            raise InputError(f"{path}: cannot be written: OpenCV has no mp4 encoder here")
-        try:
-            for index, frame in enumerate(frames):
-                writer.write(drawn(frame, track, index, scale))
-                advance()
-        finally:
-            writer.release()
+    width, height = track.frame_size_px
+    with writing_mp4(path, fps, (scale * width, scale * height)) as writer:
+        for index, frame in enumerate(frames):
+            writer.write(drawn(frame, track, index, scale))
+            advance()
 
 
 def write_overlay_picture(path: Path, frames: Iterable[np.ndarray], track: Track) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.tracking.fragments import Start
-from galileo_jax.tracking.picture import OpenFrames, mixture
-from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.picture import OpenFrames, frames_at, mixture
+from galileo_jax.tracking.pose import corners
 from galileo_jax.tracking.template import RIM_SHARE, WINDOW_PX, Outline, grey, is_plain, template_at
 
 SCENE, MOST = 64.0, 128.0  # levels of the view: the scene's, and how far the object is from it
@@ -28,11 +28,9 @@ ALL_ROUND = 1.1  # times as far as the edge that is farthest from the mark
 
 def in_own_colours(open_frames: OpenFrames, starts: Sequence[Start]) -> list[Start]:
     """Where objects are first seen, each plain one of several with the view in its own colour."""
-    firsts = {start.first_frame for start in starts}
     if len(starts) < 2:
         return list(starts)
-    frames = zip(range(max(firsts) + 1), open_frames(), strict=False)
-    kept = {index: frame for index, frame in frames if index in firsts}
+    kept = frames_at(open_frames, {start.first_frame for start in starts})
     marked = [_marked(kept.get(start.first_frame), start) for start in starts]
     known = [one for one in marked if one is not None]
     if len(known) < len(starts):
@@ -96,8 +94,7 @@ def _seen(mask: np.ndarray, point_px: tuple[float, float], outline: Outline) -> 
     parts = cv2.connectedComponents(mask.astype(np.uint8))[1]
     x, y = (round(one) for one in point_px)
     rows, columns = np.nonzero(parts == parts[y, x])
-    own = (np.column_stack([columns, rows]) - point_px) @ rotation(outline.angle_rad)
-    low, high = own.min(axis=0), own.max(axis=0)
+    low, high = corners(np.column_stack([columns, rows]) - point_px, outline.angle_rad)
     width, height = np.maximum(high - low + 1, ALL_ROUND * 2 * np.maximum(-low, high) / RIM_SHARE)
     if not mask[y, x] or min(width, height) < 2 * HALF_PX:
         return outline

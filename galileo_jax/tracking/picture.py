@@ -1,6 +1,6 @@
 """A grey frame that is read, smoothed, at any place between its pixels; and some of a film."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Set
 
 import cv2
 import numpy as np
@@ -29,10 +29,16 @@ def mixture(weights: np.ndarray, offset: float) -> View:
     return lambda frame: cv2.transform(frame, row)
 
 
+def frames_at(open_frames: OpenFrames, chosen: Set[int]) -> dict[int, np.ndarray]:
+    """By their numbers the chosen frames of a film, as far as it has them."""
+    frames = zip(range(max(chosen, default=-1) + 1), open_frames(), strict=False)
+    return {index: frame for index, frame in frames if index in chosen}
+
+
 def some_frames(open_frames: OpenFrames, count: int) -> dict[int, np.ndarray]:
     """By their numbers `SOME_FRAMES` of the `count` frames of a film, the first among them."""
-    chosen = set(np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist())
-    return {index: frame for index, frame in enumerate(open_frames()) if index in chosen}
+    chosen = np.linspace(0, count - 1, min(count, SOME_FRAMES)).astype(int).tolist()
+    return frames_at(open_frames, set(chosen))
 
 
 class Picture:

@@ -22,6 +22,12 @@ def rotation(angle_rad: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
+def corners(places: np.ndarray, angle_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest coordinates, `[2]` each, of places along axes that are turned."""
+    own = places @ rotation(angle_rad)
+    return own.min(axis=0), own.max(axis=0)
+
+
 def compose(pose: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """`pose` followed by `motion`, a small pose given in the object's own axes."""
     return np.array([*(pose[:2] + rotation(pose[2]) @ motion[:2]), pose[2] + motion[2]])

@@ -19,6 +19,11 @@ class Velocities:
     after: np.ndarray
 
     @property
+    def mean(self) -> np.ndarray:
+        """That over both steps."""
+        return (self.before + self.after) / 2
+
+    @property
     def jump(self) -> np.ndarray:
         """How much the velocity changes at this frame."""
         return self.after - self.before
@@ -59,10 +64,9 @@ def refine_pose(
     In a blow the motion during the exposure is that before, that after, or some of both:
     the mean, the earlier and the later velocity are tried, where they differ.
     """
-    middle = (velocities.before + velocities.after) / 2
     motions = [
         share * own_motion(velocity, pose[2])
-        for velocity in (middle, velocities.before, velocities.after)
+        for velocity in (velocities.mean, velocities.before, velocities.after)
     ]
     targets = [template.target(one, FINE_PX) for one in distinct(motions, template.radius)]
     fits = [(align(picture, target, pose, stretches=True), target) for target in targets]

@@ -188,8 +188,7 @@ def _learnt(
             for k in asked:
                 poses, view = looks[k].poses, looks[k].piece.view
                 if np.isfinite(poses[index, 0]):
-                    told = velocities_at(poses, index, clock)
-                    velocity = (told.before + told.after) / 2
+                    velocity = velocities_at(poses, index, clock).mean
                     into = own.get(k, first.exposure)
                     into.add(now[view], as_sharp[k], poses[index], velocity)
     return [own.get(k, first.exposure).share for k in range(len(looks))]

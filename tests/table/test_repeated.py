@@ -41,3 +41,16 @@ def test_rest_and_coarse_places_are_no_repeats(digits: int, tmp_path: Path) -> N
     height = np.clip(3.4 * times - 4.905 * times**2, 0, None)
     table = read_table(written(tmp_path, height[None], digits), None)
     assert len(table.clock) == 60 and not table.warnings
+
+
+def test_lines_are_those_of_the_file_where_a_time_above_stands_twice(tmp_path: Path) -> None:
+    """Two rows at one time, and a place that was copied ten rows below."""
+    times = np.arange(30) / FPS
+    place = np.stack([1.1 * times, 3.4 * times - 4.905 * times**2])
+    place[:, 16] = place[:, 15]
+    path = written(tmp_path, place, digits=8)
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *rows[:5], *rows[4:]]) + "\n")
+    twice, copied = read_table(path, None).warnings
+    assert "line 6: 1 times stand in several rows" in twice
+    assert f"line {16 + 1 + 2}: the place of the row beside it" in copied

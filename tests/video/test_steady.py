@@ -172,7 +172,7 @@ def test_a_rendered_hand_is_undone():
     )
     camera, filming = Camera(400.0, (60.0, 200.0), (400, 240)), Filming(sway_rad=4e-3)
     ramp = Ramp(0.3, 0.2)
-    box = (Body("box", (0.06, 0.05, 0.05)),)
+    box = (Body((0.06, 0.05)),)
     made = render_frames(motion, box, camera, ramp, filming, COUNT, seed=1)
     seen = [cv2.cvtColor(frame.picture, cv2.COLOR_BGR2GRAY) for frame in made]
     turns = sway(filming, COUNT, np.random.default_rng([1, 2]))

@@ -12,15 +12,15 @@ from galileo_jax.video.synthetic import (
     Hand,
     Motion,
     Ramp,
-    render_clip,
     render_frames,
+    write_clip,
 )
 from galileo_jax.video.synthetic.filming import project
 
 pytestmark = pytest.mark.video
 
 CAMERA = Camera(400.0, (100.0, 140.0), (240, 180))
-BOX = Body("box", (0.08, 0.05, 0.06))
+BOX = Body((0.08, 0.06))
 STILL = Filming(noise_grey_levels=0.0, flicker=0.0, exposure_s=0.0)
 SUBPIXEL_PX = 0.015  # about half of it is the least squares' own error
 CODEC_RMS_PX = 0.05
@@ -182,9 +182,9 @@ def test_object_under_a_tilted_camera_is_where_the_homography_says():
     ("body", "share"),
     [
         (BOX, 1.0),
-        (Body("cylinder", (0.03, 0.05)), 1.0),
-        (Body("sphere", (0.03,)), np.pi / 4),
-        (Body("torus", (0.06, 0.02)), 1 - (1 - np.pi / 4) / 4),
+        (Body((0.06, 0.05)), 1.0),
+        (Body((0.06, 0.06), is_round=True), np.pi / 4),
+        (Body((0.16, 0.04), is_round=True), 1 - (1 - np.pi / 4) / 4),
     ],
     ids=lambda value: getattr(value, "shape", ""),
 )
@@ -217,7 +217,8 @@ def test_codec_moves_things_by_less_than_its_share_of_the_tracking_bar(tmp_path)
     filming = replace(STILL, exposure_s=0.008, noise_grey_levels=4.0)
     exact = pictures(motion, replace(filming, noise_grey_levels=0.0), 25)
     path = tmp_path / "clip.mp4"
-    render_clip(path, motion, (BOX,), CAMERA, None, filming, 25, seed=1)
+    film = render_frames(motion, (BOX,), CAMERA, None, filming, 25, seed=1)
+    write_clip(path, film, CAMERA, filming)
     video = cv2.VideoCapture(str(path))
     decoded = [frame for ok, frame in iter(video.read, (False, None)) if ok]
     assert len(decoded) == 25
@@ -231,16 +232,7 @@ def test_nothing_is_left_of_a_clip_that_was_stopped(tmp_path):
     def stop():
         raise KeyboardInterrupt
 
+    film = render_frames(still(0.1, 0.1), (BOX,), CAMERA, None, STILL, 3, seed=1)
     with pytest.raises(KeyboardInterrupt):
-        render_clip(
-            tmp_path / "clip.mp4",
-            still(0.1, 0.1),
-            (BOX,),
-            CAMERA,
-            None,
-            STILL,
-            3,
-            seed=1,
-            on_frame=stop,
-        )
+        write_clip(tmp_path / "clip.mp4", film, CAMERA, STILL, stop)
     assert list(tmp_path.iterdir()) == []

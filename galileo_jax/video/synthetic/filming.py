@@ -1,5 +1,6 @@
 """How a clip is filmed: a camera, from metres to pixels, and what hand and sensor do to it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -34,16 +35,17 @@ class Camera:
         about_origin = np.array(
             [[sign * scale, 0.0, 0.0], [0.0, -scale, 0.0], [*self.keystone_per_m, 1.0]]
         )
-        to_origin = np.array(
-            [[1.0, 0.0, self.origin_px[0]], [0.0, 1.0, self.origin_px[1]], [0, 0, 1]]
-        )
-        cos, sin = np.cos(self.roll_rad), np.sin(self.roll_rad)
-        rolled = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        return to_origin @ rolled @ about_origin
+        return placed(self.origin_px, -self.roll_rad) @ about_origin
 
     def project(self, points_m: np.ndarray) -> np.ndarray:
         """Returns the pixels `[..., 2]` of the points `[..., 2]` in metres."""
         return project(self.world_to_image, points_m)
+
+
+def placed(position: Sequence[float] | np.ndarray, angle_rad: float) -> np.ndarray:
+    """The homography `[3, 3]` of a turn about (0, 0), from x to y, and a shift to `position`."""
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[cos, -sin, position[0]], [sin, cos, position[1]], [0, 0, 1]])
 
 
 def project(homography: np.ndarray, points: np.ndarray) -> np.ndarray:

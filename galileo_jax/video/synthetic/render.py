@@ -6,18 +6,19 @@ averaged over these (motion blur) and over each pixel's area, and laid over the 
 background with the averaged coverage as its opacity. Nothing is ever rounded to a pixel.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from galileo_jax.runtime.atomic_write import replacing
+from galileo_jax.video.encode import writing_mp4
 from galileo_jax.video.synthetic.filming import (
     Camera,
     Filming,
     Hand,
+    placed,
     project,
     sway,
     turned_camera,
@@ -79,45 +80,27 @@ class Frame:
     covered: tuple[float, ...]  # `[object]`, the share of each object's picture that the hand hides
 
 
-def render_clip(
+def write_clip(
     path: Path,
-    motion: Motion,
-    bodies: tuple[Body, ...],
+    frames: Iterable[Frame],
     camera: Camera,
-    ramp: Ramp | None,
     filming: Filming,
-    num_frames: int,
-    *,
-    seed: int,
     on_frame: Callable[[], object] = lambda: None,
 ) -> np.ndarray:
-    """Writes the clip to `path` (mp4, MPEG-4 part 2), whole or not at all.
+    """Writes frames to `path`, whole or not at all; `on_frame` is called after each (progress).
 
-    `on_frame` is called after each frame (a progress bar). The codec moves what it shows by
-    0.01 to 0.02 px RMS; a file of MJPEG would be four times as large.
+    The codec moves what it shows by 0.01 to 0.02 px RMS; a file of MJPEG would be four times as
+    large.
 
     Returns:
       `[object, frame]`, the share of each object that the hand hides, 0 to 1.
-
-    Raises:
-      OSError: the file cannot be written.
     """
     covered = []
-    with replacing(path) as temporary:
-        codec = cv2.VideoWriter.fourcc(*"mp4v")
-        fps = filming.written_fps or filming.fps
-        writer = cv2.VideoWriter(str(temporary), codec, fps, camera.size_px)
-        if not writer.isOpened():
-            raise OSError(f"{path}: no video can be written there")
-        try:
-            for frame in render_frames(
-                motion, bodies, camera, ramp, filming, num_frames, seed=seed
-            ):
-                writer.write(frame.picture)
-                covered.append(frame.covered)
-                on_frame()
-        finally:
-            writer.release()
+    with writing_mp4(path, filming.written_fps or filming.fps, camera.size_px) as writer:
+        for frame in frames:
+            writer.write(frame.picture)
+            covered.append(frame.covered)
+            on_frame()
     return np.array(covered).T
 
 
@@ -154,7 +137,7 @@ def render_frames(
         layers = []
         for body, texture in enumerate(textures):
             to_metres = _texels_to_metres(_middle(texture), texels_per_metre)
-            where = [_pose(position[body], pitch[body]) @ to_metres for position, pitch in poses]
+            where = [placed(position[body], pitch[body]) @ to_metres for position, pitch in poses]
             layers.append(_layer(texture, where, camera))
         picture = backdrop.copy()
         for layer in filter(None, layers):
@@ -215,7 +198,7 @@ def _lay(
     to_rectangle = np.array(
         [[(right - left) / width, 0, left], [0, (bottom - top) / height, top], [0, 0, 1]]
     )
-    matrix = to_canvas @ _pose(np.zeros(2), turn_rad) @ to_rectangle
+    matrix = to_canvas @ placed((0.0, 0.0), turn_rad) @ to_rectangle
     cv2.warpPerspective(
         texture,
         matrix,
@@ -279,15 +262,10 @@ def _texels_to_metres(
     return np.array([[scale, 0, -x * scale], [0, -scale, y * scale], [0, 0, 1]])
 
 
-def _pose(position_m: np.ndarray, pitch_rad: float) -> np.ndarray:
-    cos, sin = np.cos(pitch_rad), np.sin(pitch_rad)
-    return np.array([[cos, -sin, position_m[0]], [sin, cos, position_m[1]], [0, 0, 1]])
-
-
 def _hand_pose(hand: Hand, held_m: np.ndarray, time_s: float) -> np.ndarray:
     drawn_back_m = hand.speed_m_s * max(0.0, time_s - hand.leave_s)
     arm = np.array([np.cos(hand.angle_rad), np.sin(hand.angle_rad)])
-    return _pose(held_m + hand.offset_m + drawn_back_m * arm, hand.angle_rad)
+    return placed(held_m + hand.offset_m + drawn_back_m * arm, hand.angle_rad)
 
 
 def _covered(layer: Layer | None, hand: Layer, size_px: tuple[int, int]) -> float:

@@ -2,35 +2,18 @@
 
 import colorsys
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
 
-Shape = Literal["box", "cylinder", "torus", "sphere"]
-
 
 @dataclass(frozen=True)
 class Body:
-    """An object as the camera sees it, from the side: a cylinder stands, a torus lies."""
+    """An object as the camera sees it, from the side."""
 
-    shape: Shape  # box, cylinder, torus or sphere
-    # box (length along travel, depth, height), cylinder (radius, length), torus (ring radius, tube
-    # radius), sphere (radius), m
-    size_m: tuple[float, ...]
-
-    @property
-    def outline_m(self) -> tuple[float, float]:
-        """(length along the travel, height) of what is seen, m."""
-        match self.shape:
-            case "box":
-                return self.size_m[0], self.size_m[2]
-            case "cylinder":
-                return 2 * self.size_m[0], self.size_m[1]
-            case "torus":
-                return 2 * sum(self.size_m), 2 * self.size_m[1]
-            case _:
-                return 2 * self.size_m[0], 2 * self.size_m[0]
+    outline_m: tuple[float, float]  # length along the travel and height of what is seen
+    # whether its ends are half circles, as of a ball, or of a ring that lies; else they are square
+    is_round: bool = False
 
 
 def body_texture(body: Body, texels_per_metre: float, rng: np.random.Generator) -> np.ndarray:
@@ -126,8 +109,8 @@ def _fixed_point(points: np.ndarray) -> np.ndarray:
 
 
 def _silhouette(body: Body, width: int, height: int) -> np.ndarray:
-    """A rectangle, or a bar with half-circles at its ends (a sphere has no bar between)."""
-    if body.shape in ("box", "cylinder"):
+    """A rectangle, or a bar with half-circles at its ends (a ball has no bar between)."""
+    if not body.is_round:
         return np.ones((height, width), np.float32)
     y, x = np.mgrid[:height, :width].astype(np.float32)
     past_bar = np.maximum(np.abs(x - (width - 1) / 2) - (width - height) / 2, 0)
