@@ -17,7 +17,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.acting_laws import Share, seen_share
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times, in_jax
+from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import trace_cached
@@ -140,16 +140,6 @@ class Problem:
         along = basis.reshape(len(basis), -1) @ white.reshape(len(found), -1).T
         return along @ along.T
 
-    def predict(
-        self, theta: Float[jax.Array, " parameter"]
-    ) -> Float[jax.Array, "object axis frame"]:
-        """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
-        position, velocity = in_jax(self.engine)(theta[None])
-        frames = jnp.asarray(self.observation.times_s)
-        surroundings = self.model.scene.surroundings
-        own = self.share.of(theta)
-        return seen(self.kind, own, position[0], velocity[0], frames, surroundings)
-
     def simulate(
         self, theta: Float[np.ndarray, " parameter"]
     ) -> Float[np.ndarray, "object axis frame"]:
@@ -200,11 +190,8 @@ class Problem:
         self, theta: Float[np.ndarray, "batch parameter"]
     ) -> Float[np.ndarray, " batch"]:
         """When the objects are last seen, s since the release: no rollout need last longer."""
-        named, scene = self.model.by_name(theta), self.model.scene.surroundings
         times = np.repeat(self.observation.times_s[:, None], len(theta), axis=1)
-        for effect in self.model.effects + self.model.nuisances:
-            times = np.asarray(effect.time(times, named, scene))
-        return times.max(axis=0, initial=0.0)
+        return since_release(self.model, theta, times).max(axis=0, initial=0.0)
 
     def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
         """Whitened residuals, unit normal if the model is right.
@@ -270,13 +257,19 @@ def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:
 
 
 def _sharing(problem: Problem, found: Mapping[str, Parameter]) -> Problem:
-    shared = tuple(
-        found[p.name] for p in problem.parameters if p.name in found and p != found[p.name]
-    )
+    shared = tuple(found[p.name] for p in problem.parameters if found.get(p.name, p) != p)
     if not shared:
         return problem
     model = replace(problem.model, shared=shared)
     return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+
+
+def since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """The clip's times as the time since the release, s; `theta` is `[..., parameter]`."""
+    named = model.by_name(theta)
+    for effect in model.effects + model.nuisances:
+        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
+    return times_s
 
 
 class Kind(NamedTuple):

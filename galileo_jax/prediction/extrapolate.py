@@ -10,9 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from galileo_jax import __version__
-from galileo_jax.comparison.phases import since_release
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Problem, since_release
 from galileo_jax.inference.summarise import summarise
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
