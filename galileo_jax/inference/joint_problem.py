@@ -131,11 +131,13 @@ class JointProblem:
         Raises:
           ValueError: the models have no effect of that name.
         """
-        known, brought, is_given = self._brought
-        if unknown := [name for name in effects if name not in known]:
-            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(known)}")
-        absent = [known[name] for name in known if name not in effects]
-        return ~is_given & ~brought[absent].any(axis=0)
+        brought = self._brought
+        if unknown := [name for name in effects if name not in brought]:
+            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(brought)}")
+        found = np.array([p.role != "given" for p in self.parameters])
+        for name in brought.keys() - set(effects):
+            found &= ~brought[name]
+        return found
 
     def brought_by(self, effect: str) -> np.ndarray:
         """Where the parameters of one of the models' effects stand, its strengths first: indices.
@@ -143,32 +145,20 @@ class JointProblem:
         Raises:
           ValueError: the models have no effect of that name.
         """
-        known, brought, _ = self._brought
-        if effect not in known:
-            raise ValueError(f"effects not in the model: {effect}; there: {sorted(known)}")
-        return np.flatnonzero(brought[known[effect]])
+        if effect not in self._brought:
+            raise ValueError(f"effects not in the model: {effect}; there: {sorted(self._brought)}")
+        return np.flatnonzero(self._brought[effect])
 
     @cached_property
-    def _brought(self) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
-        """What each effect brings.
-
-        Returns:
-          Rows of the effects by name; the parameters that each brings, `[effect, parameter]`; and
-          those that are given, `[parameter]`.
-        """
-        named: dict[str, set[str]] = {}
-        for problem in self.problems:
-            scene = problem.model.scene.surroundings
-            for effect in problem.model.effects:
-                found = named.setdefault(effect.name, set())
-                found.update(p.name for p in effect.parameters(scene))
-        brought = np.zeros((len(named), len(self.parameters)), bool)
-        is_given = np.zeros(len(self.parameters), bool)
+    def _brought(self) -> dict[str, np.ndarray]:
+        """By the effect's name, which parameters it brings, `[parameter]`."""
+        found: dict[str, np.ndarray] = {}
         for problem, column in zip(self.problems, self.columns, strict=True):
-            for parameter, joint in zip(problem.parameters, column, strict=True):
-                brought[:, joint] = [parameter.name in own for own in named.values()]
-                is_given[joint] = parameter.role == "given"
-        return {name: row for row, name in enumerate(named)}, brought, is_given
+            scene, names = problem.model.scene.surroundings, problem.model.names
+            for effect in problem.model.effects:
+                own = found.setdefault(effect.name, np.zeros(len(self.parameters), bool))
+                own[[column[names.index(p.name)] for p in effect.parameters(scene)]] = True
+        return found
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
