@@ -75,21 +75,26 @@ def metropolis_posterior(
 
     def run(
         valley: Valley, begin: np.ndarray, mean: np.ndarray, covariance: np.ndarray,
-        part: Settings, is_second: bool,
+        part: Settings, before: int = 0,
     ) -> Posterior:  # fmt: skip
-        before, file = 0, checkpoint
-        if is_second:
-            before = total - part.warmup_steps - part.max_steps
-            file = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
+        """Draws of w after `before` steps: of none in the first run."""
+
+        def report(state: Progress) -> None:
+            if on_block is not None:
+                on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
+
+        file = checkpoint
+        if before and checkpoint:
+            file = checkpoint.with_name(f"{checkpoint.name}.second")
         return sample(
-            jax.random.fold_in(key, 1) if is_second else key,
+            jax.random.fold_in(key, 1) if before else key,
             SAMPLERS[sampler].from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
             density_of(trials, fit, valley),
             jnp.asarray(begin),
             trials.names,
             settings=part,
             monitor=lambda w: watch(valley(w)),
-            on_block=_of_both_runs(on_block, before, total),
+            on_block=report,
             checkpoint=file,
             identity=identity,
         )
@@ -99,29 +104,18 @@ def metropolis_posterior(
     else:
         begin = valley.straight(starts)
     first, second = _parts(settings)
-    posterior = run(valley, begin, np.zeros(dim), np.eye(dim), first, False)
+    posterior = run(valley, begin, np.zeros(dim), np.eye(dim), first)
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     if second is not None and not posterior.is_converged:
         w = posterior.draws
         later, last = w[:, w.shape[1] // 2 :].reshape(-1, dim), w[:, -1]
-        before, (valley, mean, covariance) = valley, learned(valley, later)
-        begin = last if valley is before else valley.straight(before(last))
-        posterior = run(valley, begin, mean, covariance, second, True)
+        old, (valley, mean, covariance) = valley, learned(valley, later)
+        begin = last if valley is old else valley.straight(old(last))
+        before = first.warmup_steps + first.max_steps
+        posterior = run(valley, begin, mean, covariance, second, before)
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda w: trials.theta(valley(w)), trials.names)
-
-
-def _of_both_runs(
-    on_block: Callable[[Progress], None] | None, before: int, total: int
-) -> Callable[[Progress], None]:
-    """Tells `on_block` the progress of a run that begins after `before` steps of `total`."""
-
-    def report(state: Progress) -> None:
-        if on_block is not None:
-            on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
-
-    return report
 
 
 def learned(valley: Valley, w: np.ndarray) -> tuple[Valley, np.ndarray, np.ndarray]:
