@@ -154,7 +154,7 @@ class Residuals:
         seen = _free_index(is_seen[:, own])
         white, slopes = in_chunks(
             POINTS,
-            lambda *rows: seen_slopes_batch(clip.kind, *rows, clip.arrays),
+            lambda *rows: seen_slopes_batch(clip.problem.kind, *rows, clip.arrays),
             *(share.of(theta), seen, points.noise[:, c], *moved),
         )
         jacobian = np.zeros((*white.shape, index.shape[1]))
@@ -188,8 +188,8 @@ def _open(each: Float[np.ndarray, "side row value"]) -> Float[np.ndarray, "row v
 
 def _white(clip: FittedClip) -> Callable[..., Any]:
     """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
-    own = clip.problem.share.of
-    return lambda theta, *part: white_batch(clip.kind, own(theta), *part, clip.arrays)
+    kind, own = clip.problem.kind, clip.problem.share.of
+    return lambda theta, *part: white_batch(kind, own(theta), *part, clip.arrays)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
