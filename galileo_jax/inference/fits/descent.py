@@ -169,6 +169,15 @@ def secants(
     return np.where(is_known[:, None, None], found, second)
 
 
+def _turned(here: Slopes, there: Slopes) -> Float[np.ndarray, "point parameter"]:
+    """(J_there - J_here)^T r_there; `there` may have fewer columns."""
+    width, turned = there.index.shape[1], np.zeros(there.index.shape)
+    for before, after, white in zip(here.jacobian, there.jacobian, there.white, strict=True):
+        more = np.swapaxes(after - before[:, :, :width], 1, 2)
+        turned += (more @ white[..., None])[..., 0]
+    return there.among_all(turned)
+
+
 def _tells_better(
     own: Quadratic, new: Quadratic, bends: np.ndarray, second: np.ndarray
 ) -> np.ndarray:
@@ -292,9 +301,9 @@ class Descent:
             if self.is_smooth and num_steps and len(active) <= FEW:
                 is_better = _tells_better(own, new, bends[active], beside)
                 rows = active[better]
-                second[rows] = self._secants(
-                    beside[better], slopes.take(rows), found, own, new, better
-                )
+                step, change = new.z[better] - own.z[better], (new.gradient - own.gradient)[better]
+                turned = _turned(slopes.take(rows), found)
+                second[rows] = secants(beside[better], step, turned, change)
                 beside = second[active]
                 is_better &= _is_convex(own.normal + beside) & _is_convex(new.normal + beside)
                 beside = np.where(is_better[:, None, None], beside, 0.0)
@@ -352,24 +361,6 @@ class Descent:
         found = quadratic(slopes, there.z[better])
         new.gradient[better], new.normal[better] = found.gradient, found.normal
         return new, better, slopes
-
-    def _secants(
-        self,
-        second: np.ndarray,
-        here: Slopes,
-        found: Slopes,
-        own: Quadratic,
-        new: Quadratic,
-        rows: np.ndarray,
-    ) -> np.ndarray:
-        """`secants` of proposals `rows` of `own` and `new`; `here`, `found`: slopes of these."""
-        width, turned = found.index.shape[1], np.zeros(found.index.shape)
-        for before, after, white in zip(here.jacobian, found.jacobian, found.white, strict=True):
-            more = np.swapaxes(after - before[:, :, :width], 1, 2)
-            turned += (more @ white[..., None])[..., 0]
-        step = new.z[rows] - own.z[rows]
-        change = new.gradient[rows] - own.gradient[rows]
-        return secants(second, step, found.among_all(turned), change)
 
     def slopes(self, points: Batch, widths: np.ndarray, motions: Motions | None = None) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
