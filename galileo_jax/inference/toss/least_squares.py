@@ -123,8 +123,7 @@ class _Arrow:
 
     def step(self, damped: float) -> tuple[np.ndarray, np.ndarray]:
         """The damped step of what all share `[common]` and of the starts `[toss, 12]`."""
-        own = self.bb + damped * np.eye(self.bb.shape[-1]) * self.bb
-        solved = np.linalg.solve(own, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+        solved = self._starts_solved(damped)
         whole = self.aa.sum(axis=0) + np.diag(self.prior)
         matrix = whole + damped * np.diag(np.diag(whole))
         matrix = matrix - np.sum(self.ab @ solved[..., :-1], axis=0)
@@ -132,9 +131,14 @@ class _Arrow:
         moved = np.linalg.solve(matrix, right)
         return moved, solved[..., -1] - solved[..., :-1] @ moved
 
+    def _starts_solved(self, damped: float) -> np.ndarray:
+        """Each toss's start by what is common, and by its own pull in the last column."""
+        own = self.bb + damped * np.eye(self.bb.shape[-1]) * self.bb
+        return np.linalg.solve(own, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+
     def sandwich(self) -> np.ndarray:
         """The covariance of what all share, from the scatter of the tosses' gradients."""
-        solved = np.linalg.solve(self.bb, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+        solved = self._starts_solved(0.0)
         each = self.aa - self.ab @ solved[..., :-1]
         bread = pinvh(each.sum(axis=0) + np.diag(self.prior))
         scores = self.ga - (self.ab @ solved[..., -1:])[..., 0]
