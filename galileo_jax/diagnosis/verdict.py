@@ -335,10 +335,7 @@ def farthest(decisive: float) -> float:
 
 
 def looked_at_again(
-    verdict: Verdict,
-    named: Candidate,
-    expected: Sequence[tuple[Candidate, float]],
-    decisive: float,
+    verdict: Verdict, named: Candidate, expected: Sequence[tuple[Candidate, float]], decisive: float
 ) -> Verdict:
     """A named verdict, or ambiguous where a clip like this one does not tell a confusable from it.
 

@@ -34,11 +34,7 @@ from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
 from galileo_jax.inference.fits.laplace import laplace_fits, points_of
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Sides
-from galileo_jax.inference.joint_problem import (
-    NOISE_SCALE_RANGE,
-    JointProblem,
-    noise_explains,
-)
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem, noise_explains
 from galileo_jax.runtime.batching import side_by_side
 
 MANY = 64  # points of a usual batch
@@ -205,11 +201,7 @@ class GradientFitter:
         return Batch(np.where(free, z, 0.0), free, np.tile(noise, (len(z), 1)))
 
     def _polish(
-        self,
-        points: Batch,
-        owner: np.ndarray,
-        lowest: float = np.inf,
-        settled: float | None = None,
+        self, points: Batch, owner: np.ndarray, lowest: float = np.inf, settled: float | None = None
     ) -> tuple[dict[int, GradientFit], float]:
         """Fits by the row of the point from which each came, and the least cost.
 

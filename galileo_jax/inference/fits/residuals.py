@@ -7,11 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.fitted_clip import FittedClip
-from galileo_jax.inference.fits.kernels import (
-    Quadratic,
-    seen_slopes_batch,
-    white_batch,
-)
+from galileo_jax.inference.fits.kernels import Quadratic, seen_slopes_batch, white_batch
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 
@@ -104,11 +100,7 @@ class Residuals:
         return [in_chunks(MOTIONS, _white(clip), *motion, noise) for clip, motion, noise in each]
 
     def slopes(
-        self,
-        points: Batch,
-        steps: np.ndarray,
-        sides: Sides,
-        motions: Motions | None = None,
+        self, points: Batch, steps: np.ndarray, sides: Sides, motions: Motions | None = None
     ) -> Slopes:
         """By differences, where the motion changes; in parameters of clock and camera by JAX.
 

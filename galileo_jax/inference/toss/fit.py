@@ -57,10 +57,7 @@ class TossSolution:
 
 
 def fit_poses(
-    tosses: Sequence[Poses],
-    edge_m: float,
-    gravity: float,
-    window_s: float | None = None,
+    tosses: Sequence[Poses], edge_m: float, gravity: float, window_s: float | None = None
 ) -> TossSolution:
     """Fits cubes of one size.
 
