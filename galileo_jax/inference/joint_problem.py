@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import chdtrc
 
 from galileo_jax.inference.problem import Problem
@@ -123,10 +123,7 @@ class JointProblem:
         return np.array([p.absent for p in self.parameters])
 
     def free(self, effects: Sequence[str]) -> np.ndarray:
-        """Which parameters a hypothesis leaves free, `[parameter]`.
-
-        Args:
-          effects: names of those that are there, of the models' effects.
+        """Which parameters a hypothesis with these effects leaves free, `[parameter]`.
 
         Raises:
           ValueError: the models have no effect of that name.
@@ -200,6 +197,16 @@ class JointProblem:
     def of_clip(self, theta: np.ndarray, clip: int) -> np.ndarray:
         """The parameters of one clip's model, `[..., model parameter]`."""
         return np.asarray(theta)[..., self.columns[clip]]
+
+    def simulate(self, theta: Float[np.ndarray, " parameter"]) -> list[np.ndarray]:
+        """What the camera would see of each clip: `[object, axis, frame]`, m."""
+        each = enumerate(self.problems)
+        return [problem.simulate(self.of_clip(theta, clip)) for clip, problem in each]
+
+    def places(self, names: Sequence[str]) -> Int[np.ndarray, " name"]:
+        """Where parameters of these names stand; -1 where there is none of that name."""
+        where = {name: i for i, name in enumerate(self.names)}
+        return np.array([where.get(name, -1) for name in names])
 
     def alone(self, clip: int) -> "JointProblem":
         """One of the clips."""
