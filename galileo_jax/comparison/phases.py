@@ -44,12 +44,9 @@ def phases_of(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
 def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     """The phase of every object in every frame, from the fitted motion.
 
-    held: before the release; ramp, foot (its length spans the foot), table; collision: near
-    the first hit; after it; at rest: where nothing moves any more, or not yet; fall, flight,
-    swing, liquid: without anything to slide on.
-
-    Returns:
-      `[object, frame]`, indices into `PHASES`.
+    `[object, frame]`, indices into `PHASES`. held: before the release; ramp, foot (its length spans
+    the foot), table; collision: near the first hit; after it; at rest: where nothing moves any
+    more, or not yet; fall, flight, swing, liquid: without anything to slide on.
     """
     model = problem.model
     scene = model.scene.surroundings

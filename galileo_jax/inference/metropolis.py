@@ -48,24 +48,21 @@ def metropolis_posterior(
     have not converged after `FIRST_STEPS`, what they have drawn so far tunes a second run, from
     where they are, in coordinates and with proposals that suit it; it alone is returned.
 
+    Draws are in the parameters' units: of the posterior of `trials`, noise scales included; where
+    the fit has sizes of imperfections, integrated over these. They have converged when the main
+    parameters that the fit found identified, and the mass ratio, have R-hat and ESS as asked for.
+
     Args:
-      trials: the target is their posterior, noise scales included; where the fit has sizes of
-        imperfections, integrated over these.
+      trials: what was fitted.
       fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long, both runs together.
       num_chains: how many.
-      starts: `[chain, parameter]`, where they begin, in z, led along the valley as proposals
-        are; default: dispersed in it.
-      checkpoint: file that interrupted chains go on from; see `samplers.sample`. That of a
-        second run is beside it.
-      identity: of what is sampled; a checkpoint of anything else is refused.
+      starts: `[chain, parameter]`, in z, led along the valley; default: dispersed in it.
+      checkpoint: as of `samplers.sample`; that of a second run is beside it.
+      identity: as of `samplers.sample`.
       on_block: called with the progress.
-
-    Returns:
-      Draws in the parameters' units. Converged when the main parameters that the fit found
-      identified, and the mass ratio, have R-hat and ESS as asked for.
     """
     residuals, key = Residuals(trials), jax.random.key(seed)
     valley = valley_round(fit, residuals)

@@ -172,14 +172,9 @@ class Problem:
     ) -> Any:
         """What follows from the motion with each of `theta`.
 
-        Args:
-          theta: as of `simulate_batch`.
-          then: maps parts of the batch, as large as programs are compiled for: `(theta, position,
-            velocity, *rows)`, motions as of `motion`, to a PyTree of arrays `[part, ...]`.
-          *rows: more arguments of `then`, `[batch, ...]`.
-
-        Returns:
-          What `then` of the whole batch would, as NumPy arrays.
+        `then` maps parts of the batch, as large as programs are compiled for: `(theta, position,
+        velocity, *rows)`, motions as of `motion` and `rows` `[batch, ...]`, to a PyTree of arrays
+        `[part, ...]`. Returned is what it would of the whole batch, as NumPy arrays.
         """
         if isinstance(self.engine, EngineJax):
             return self.engine.each(theta, self.last_seen_s(theta), then, *rows)
@@ -194,12 +189,9 @@ class Problem:
         return since_release(self.model, theta, times).max(axis=0, initial=0.0)
 
     def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
-        """Whitened residuals, unit normal if the model is right.
+        """Whitened residuals `[..., object * 2 * frame]`, unit normal if the model is right.
 
         `predicted_m`: `[..., object, 2, frame]`. `noise_scale`: on the tracker's errors.
-
-        Returns:
-          `[..., object * 2 * frame]`.
         """
         difference = self.data.observed_m - predicted_m
         return self.data.whiten_batch(difference, noise_scale)
@@ -212,12 +204,9 @@ class Problem:
         All imperfections are of their priors' medians in it, whatever sizes were found: d is the
         same linear function of the residuals r, and what it leaves falls as models get better.
 
-        Args:
-          predicted_m: `[object, axis, frame]`.
-          is_usual: else imperfections are of the sizes that were found, as part of the model.
-
-        Returns:
-          the same shape; the prediction in an exact world, and where imperfections have no place.
+        The prediction itself in an exact world, and where imperfections have no place.
+        `predicted_m`: `[object, axis, frame]`. `is_usual`: else imperfections are of the sizes that
+        were found, as part of the model.
         """
         if self.sizes is None:
             return predicted_m

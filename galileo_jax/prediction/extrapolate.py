@@ -130,9 +130,8 @@ def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.nd
 def answers(fit: Fitted, motions: Motions, seconds: float, seed: int) -> dict[str, Any]:
     """Will it slide, how far, where does it stop, does it hit: prediction.json.
 
-    Returns:
-      Probabilities are shares of the draws; quantities are mean, sd and central 95 % interval
-      over the draws to which they apply (rest: those that stop), null where there are none.
+    Probabilities are shares of the draws; quantities are mean, sd and central 95 % interval over
+    the draws to which they apply (rest: those that stop), null where there are none.
     """
     surroundings = fit.problem.model.scene.surroundings
     clip_end_s = float(fit.problem.observation.times_s[-1])

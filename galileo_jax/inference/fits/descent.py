@@ -145,11 +145,8 @@ def secants(
 
     As it was where the cost does not bend upwards along the step (y^T step <= 0).
 
-    Args:
-      second: before; made smaller where residuals became so.
-      step: of the parameters, z.
-      turned: (J_there - J_here)^T r_there.
-      change: of the cost's gradient, y.
+    `second`: before; made smaller where residuals became so. `step`: of the parameters, z.
+    `turned`: (J_there - J_here)^T r_there. `change`: of the cost's gradient, y.
     """
 
     def along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -340,13 +337,11 @@ class Descent:
         """The cost round proposals; of those that cost more than where they set off no slopes.
 
         A proposal in three is refused, and its slopes would be most of the work; of few proposals
-        they are taken all the same, and tell `widths`.
+        they are taken all the same, and tell `widths`. Returned are the cost; which proposals have
+        slopes; and these.
 
         `there`: the proposals. `own`: where they set off. `widths`: `[point, model parameter]`, of
         all points; those of `active` are changed. `active`: `[proposal]`, which points they are of.
-
-        Returns:
-          The cost; `[proposal with slopes]`, which have; and these.
         """
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)
@@ -405,16 +400,11 @@ def polish(
     """Descends again and again, each time with noise scales that suit the residuals.
 
     Each round begins with no damping to speak of, so that one that was stuck in a curved valley
-    sets off anew: settled is who gains less than `settled` nats in all of a round.
+    sets off anew: settled is who gains less than `settled` nats in all of a round, of at most
+    `max_steps`, in which no noise scale drifts by more than `drift`.
 
-    Args:
-      descent: of the trials.
-      points: where the search ended.
-      owner: `[point]`, whose each is.
-      settled: nats.
-      max_steps: of one round.
-      lowest: as in what was returned, of other points polished before.
-      drift: of a noise scale, in a round: more has not settled.
+    `points`: where the search ended. `owner`: `[point]`, whose each is. `lowest`: as in what was
+    returned, of other points polished before.
     """
     z, noise = points.z.copy(), points.noise.copy()
     count, size = z.shape

@@ -61,12 +61,8 @@ class GradientFitter:
     """Descends on the residuals of trials, for any hypotheses.
 
     Of arguments `z` and `free` (`JointProblem.free`) are `[point, model parameter]`, and `owner`
-    `[point]` is which hypothesis each point belongs to, from 0.
-
-    Attributes:
-      trials: what is fitted.
-      residuals: of the trials.
-      is_smooth: whether motion is smooth at every scale, as the rigid engine's is.
+    `[point]` is which hypothesis each point belongs to, from 0. It `is_smooth` where motion is so
+    at every scale, as the rigid engine's is.
     """
 
     def __init__(self, trials: JointProblem, settled_nats: float = SETTLED_NATS):
@@ -81,10 +77,9 @@ class GradientFitter:
         return Descent(self.residuals, self.trials.coarse_steps, self.is_smooth, sides)
 
     def compile(self, with_races: bool = False) -> None:
-        """Compiles (or reads from the cache) all parts, so that `fit` only computes.
+        """Compiles (or reads from the cache) all parts, so that fits only compute.
 
-        Args:
-          with_races: what many hypotheses at once need, too.
+        `with_races`: what many hypotheses at once need, too.
         """
         one, many = (np.zeros((n, self._count)) for n in (1, MANY))
         descent, parts = self._descent(), list[Callable[[], Any]]()

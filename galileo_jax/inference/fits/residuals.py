@@ -68,9 +68,7 @@ class Slopes(NamedTuple):
 class Residuals:
     """Of all clips of the trials; values of a clip as in `Problem.whiten`, in padded frames.
 
-    Attributes:
-      clips: ready for compiled code.
-      num_rollouts: made so far.
+    `clips` are ready for compiled code; `num_rollouts` were made so far.
     """
 
     def __init__(self, trials: JointProblem):

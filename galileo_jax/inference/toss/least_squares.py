@@ -37,7 +37,6 @@ class Solution:
     own: np.ndarray  # `[toss, 12]`
     covariance: np.ndarray  # `[common, common]`, of the common ones, over tosses
     residuals: np.ndarray  # `[toss, frame, 6]`, whitened; 0 where nothing counts
-    loss: float  # what was made small
     has_converged: bool  # whether the last step gained next to nothing
 
 
@@ -89,7 +88,7 @@ def solve(
         if has_converged:
             break
     sandwich = arrow_at(left, common, own).sandwich()
-    return Solution(common, own, sandwich, left, loss, has_converged)
+    return Solution(common, own, sandwich, left, has_converged)
 
 
 class _Arrow:
