@@ -361,8 +361,7 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
     if verdict.status == "unknown":
         best = best_named(candidates)
         return best if best.log_evidence > LEAST_GAIN else None
-    names = ("+".join(verdict.effects), verdict.effects[0])
-    return next(c for c in candidates if c.name in names)
+    return next(c for c in candidates if c.name == verdict.names[0])
 
 
 def is_about_pairs(verdict: Verdict) -> bool:
