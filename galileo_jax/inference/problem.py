@@ -242,15 +242,13 @@ def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:
         for parameter in problem.parameters:
             if parameter.role != "nuisance" and not parameter.per_clip:
                 found[parameter.name] = joined(found.get(parameter.name, parameter), parameter)
-    return tuple(_sharing(problem, found) for problem in problems)
-
-
-def _sharing(problem: Problem, found: Mapping[str, Parameter]) -> Problem:
-    shared = tuple(found[p.name] for p in problem.parameters if found.get(p.name, p) != p)
-    if not shared:
-        return problem
-    model = replace(problem.model, shared=shared)
-    return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+    sharing = []
+    for problem in problems:
+        if others := tuple(found[p.name] for p in problem.parameters if found.get(p.name, p) != p):
+            model = replace(problem.model, shared=others)
+            problem = replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+        sharing.append(problem)
+    return tuple(sharing)
 
 
 def since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
