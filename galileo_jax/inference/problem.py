@@ -17,7 +17,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.acting_laws import Share, seen_share
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times
+from galileo_jax.rollout.rollout import Engine, Motion, Trajectory, at_times, in_jax
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import trace_cached
@@ -139,6 +139,16 @@ class Problem:
         white = np.einsum("oijt,mojt->moit", root, np.stack(found))
         along = basis.reshape(len(basis), -1) @ white.reshape(len(found), -1).T
         return along @ along.T
+
+    def predict(
+        self, theta: Float[jax.Array, " parameter"]
+    ) -> Float[jax.Array, "object axis frame"]:
+        """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
+        position, velocity = in_jax(self.engine)(theta[None])
+        frames = jnp.asarray(self.observation.times_s)
+        surroundings = self.model.scene.surroundings
+        own = self.share.of(theta)
+        return seen(self.kind, own, position[0], velocity[0], frames, surroundings)
 
     def simulate(
         self, theta: Float[np.ndarray, " parameter"]
