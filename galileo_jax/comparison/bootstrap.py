@@ -41,14 +41,9 @@ def replicates(
 ) -> list[np.ndarray]:
     """Whitened residuals of refitted replicates, of each clip `[replicate, value]`.
 
-    Args:
-      trials: the clips.
-      fit: whose hypothesis, parameters and Jacobian are taken as true.
-      noise_scale: `[clip]`, at which residuals are whitened; the fit's own may differ.
-      mode_size: of each clip, the modes' amplitudes over their sd.
-      labels: of each clip, `[object, frame]`, the phases of its motion.
-      count: how many.
-      seed: of the draws.
+    The fit's hypothesis, parameters and Jacobian are taken as true. `noise_scale`: `[clip]`, at
+    which residuals are whitened; the fit's own may differ. `mode_size`: of each clip, the modes'
+    amplitudes over their sd. `labels`: of each clip, `[object, frame]`, the phases of its motion.
     """
     generator = np.random.default_rng([seed, 31])
     free = np.flatnonzero(fit.free[: len(trials.model_parameters)])

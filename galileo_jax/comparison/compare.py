@@ -28,7 +28,7 @@ from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.result import PULLED_Z, error_of
+from galileo_jax.inference.result import PULLED_Z, error_of, velocity_residuals
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import Whitening, is_measured
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
@@ -159,9 +159,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         errors_at(own, scale[None], np.ones(1), data)[0]
         for own, scale, data in zip(measured, scales, whitenings, strict=True)
     ]
-    predicted = [
-        problem.simulate(trials.of_clip(theta, c)) for c, problem in enumerate(trials.problems)
-    ]
+    predicted = trials.simulate(theta)
     places = [
         _place(trials.problems[cell.clip], predicted[cell.clip], white[cell.clip], cell, float(own))
         for cell, own in zip(cells, z, strict=True)
@@ -261,14 +259,9 @@ def _place(
 ) -> Place:
     observation = problem.observation
     i, a = observation.names.index(cell.object), observation.axes.index(cell.axis)
-    frames = len(observation.times_s)
-    index = cell.index % frames
-    residual = observation.measured_part(observation.position_m - predicted_m)[i, a, index]
-    follows = np.diff(index) == 1
-    dt = np.diff(observation.times_s[index])[follows]
-    speed = np.diff(residual)[follows] / dt
-    variance = observation.measured_variance_m2[i, a, index]
-    noise = (variance[1:] + variance[:-1])[follows] / dt**2
+    index = cell.index % len(observation.times_s)
+    steps = index[:-1][np.diff(index) == 1]
+    speed, noise = (v[i, a, steps] for v in velocity_residuals(observation, predicted_m))
     left = white[cell.index]
     neighbours = float(np.sum(left[1:] * left[:-1]) / max(np.sum(left**2), 1e-12))
     return Place(

@@ -56,16 +56,13 @@ def find_cells(
 def statistics(white: np.ndarray, cell: Cell, least: float, correlation: float = 0.0) -> np.ndarray:
     """Power, slowness and whiteness of one cell, each about normal if the model is right.
 
-    Args:
-      white: `[replicate, value]`, residuals of the clip.
-      cell: where to look.
-      least: the sum of squares that noise alone gives there. Where there is less, neighbours that
-        go together more than expected count against it: a tracker's faint memory is no physics.
-      correlation: of neighbours that noise alone has there. Where the patterns that the likelihood
-        allows for take up all that is smooth, what is left alternates.
+    `[replicate, 3]`; sums of squares as their cube roots (Wilson and Hilferty 1931).
 
-    Returns:
-      `[replicate, 3]`; sums of squares as their cube roots (Wilson and Hilferty 1931).
+    `white`: `[replicate, value]`, residuals of the clip. `least`: the sum of squares that noise
+    alone gives there. Where there is less, neighbours that go together more than expected count
+    against it: a tracker's faint memory is no physics. `correlation`: of neighbours that noise
+    alone has there. Where the patterns that the likelihood allows for take up all that is smooth,
+    what is left alternates.
     """
     values = white[:, cell.index]
     slow = min(MAX_SLOW, max(1, int(SLOW_SHARE * len(cell.index))))

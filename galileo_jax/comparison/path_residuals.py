@@ -57,8 +57,8 @@ def path_residuals(
     drawn = drawn[np.random.default_rng(seed).choice(len(drawn), NUM_DRAWS, replace=False)]
     theta = trials.theta(fit.z, fit.free)
     found = []
-    for clip, problem in enumerate(trials.problems):
-        best = problem.simulate(trials.of_clip(theta, clip))
+    for clip, best in enumerate(trials.simulate(theta)):
+        problem = trials.problems[clip]
         draws = problem.simulate_batch(trials.of_clip(drawn, clip))
         draws = draws[np.isfinite(draws).all(axis=(1, 2, 3))]
         for i, name in enumerate(problem.observation.names):
@@ -166,10 +166,8 @@ class Interval:
 def worst_interval(values: np.ndarray, times_s: np.ndarray) -> Interval | None:
     """The interval of largest |sum| / sqrt(number).
 
-    `values` `[frame]` are N(0, 1) where the model is right; NaN is left out.
-
-    Returns:
-      None with fewer than three values. White noise gives a z of about 3.0 for 120 values.
+    `values` `[frame]` are N(0, 1) where the model is right; NaN is left out. None with fewer than
+    three values. White noise gives a z of about 3.0 for 120 values.
     """
     known = np.isfinite(values)
     if known.sum() < FEWEST:

@@ -8,9 +8,8 @@ from itertools import combinations, pairwise, product
 
 import numpy as np
 
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Problem, since_release
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.model.model import Model
 from galileo_jax.numerics.line_segments import distance_to_segment
 
 ON_A_SURFACE = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
@@ -45,12 +44,9 @@ def phases_of(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
 def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     """The phase of every object in every frame, from the fitted motion.
 
-    held: before the release; ramp, foot (its length spans the foot), table; collision: near
-    the first hit; after it; at rest: where nothing moves any more, or not yet; fall, flight,
-    swing, liquid: without anything to slide on.
-
-    Returns:
-      `[object, frame]`, indices into `PHASES`.
+    `[object, frame]`, indices into `PHASES`. held: before the release; ramp, foot (its length spans
+    the foot), table; collision: near the first hit; after it; at rest: where nothing moves any
+    more, or not yet; fall, flight, swing, liquid: without anything to slide on.
     """
     model = problem.model
     scene = model.scene.surroundings
@@ -77,14 +73,6 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
         label[i][np.abs(times - hit_s[i]) <= COLLISION_S] = PHASES.index("collision")
         label[i][times < 0 if scene.starts_moving else times <= 0] = PHASES.index("held")
     return label
-
-
-def since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-    """The clip's times as the time since the release, s."""
-    named = model.by_name(theta)
-    for effect in model.effects + model.nuisances:
-        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
-    return times_s
 
 
 def free_phase(scene: Surroundings) -> str:

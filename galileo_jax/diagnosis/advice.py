@@ -68,14 +68,16 @@ OPEN = ("contested", "contested_together", "not_told_apart", "separated_by_prior
 
 def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, ...]:
     """Sentences for the user: what would tell more. Empty where nothing is open."""
+    motion = _motion(scene)
+    again = ANOTHER_RUN[motion]
     if verdict.status == "unknown":
         form = verdict.form
         known = () if form is None else (f"it looks like {FORM_BY_NAME[form].meaning} ({form})",)
         if any(why.rule in OPEN for why in verdict.reasons):
             known = (
                 *known,
-                f"{_another_run(scene)}, and diagnose both clips together: within one clip time, "
-                "place and speed change together, in two they do not",
+                f"{again}, and diagnose both clips together: within one clip time, place and "
+                "speed change together, in two they do not",
             )
         return (
             *known,
@@ -83,7 +85,6 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             "it, write it as an effect of your own (ten lines of Python: "
             "docs/how-to/write_an_effect.md) and run diagnose again with --effects-from",
         )
-    motion, again = _motion(scene), _another_run(scene)
     if verdict.status == "named":
         seconds = [why for why in verdict.reasons if why.rule == "second_possible"]
         others = (why.numbers["second"] for why in seconds)
@@ -116,11 +117,6 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             "diagnose several clips of the same objects together: they share masses and friction"
         )
     return tuple(said)
-
-
-def _another_run(scene: Surroundings) -> str:
-    """What to film again."""
-    return ANOTHER_RUN[_motion(scene)]
 
 
 def _motion(scene: Surroundings) -> str:

@@ -40,12 +40,9 @@ def changed_numbers(
 ) -> list[dict[str, Changed]]:
     """The main parameters and ratios of masses that would be others, by more than their sd.
 
-    Of each case: by how much, in the number's unit and in sds, two figures of both.
-
-    Args:
-      trials: the clips with all effects.
-      fit: of a model without some of them.
-      probes: `[case, parameter]`, in units: the fit's parameters with an effect at some strength.
+    Of each case: by how much, in the number's unit and in sds, two figures of both. `fit`: of a
+    model without some of the effects of `trials`. `probes`: `[case, parameter]`, in units: its
+    parameters with an effect at some strength.
     """
     count = fit.jacobian.shape[1]
     free = np.flatnonzero(fit.free[:count])

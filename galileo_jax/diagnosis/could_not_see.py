@@ -89,12 +89,10 @@ def unseen(
 
     Nothing is said where the model has parameters of its own, as that of a law.
 
-    Args:
-      trials: the clips with all effects.
-      last: describes the clips: else nobody knows their noise.
-      log_priors: of the effects of the library, over that of the model without effects.
-      seed: of the shapes that are tried.
-      exact: the same effects in an exact world, where it is imperfections that describe the clips.
+    `trials`: with all effects. `last`: describes the clips: else nobody knows their noise.
+    `log_priors`: of the effects of the library, over that of the model without effects. `seed`: of
+    the shapes that are tried. `exact`: the same effects in an exact world, where it is
+    imperfections that describe the clips.
     """
     own = last.of(trials)  # with imperfections, perhaps
     if own.names != trials.names:
@@ -131,15 +129,11 @@ def _num_left(fit: GradientFit) -> float:
 def smallest_shown(
     power: float, num_left: float, prior: Prior, absent: float, log_prior: float, needed: float
 ) -> float:
-    """The smallest strength whose expected log odds convince; infinite where none does.
+    """The smallest strength whose expected log odds are as `needed`; infinite where none has.
 
-    Args:
-      power: squared length of the slope to a strength of 1, in units of the noise.
-      num_left: how many residuals tell the noise.
-      prior: of the strength.
-      absent: at which the effect is not there.
-      log_prior: of the effect, over that of the model without it.
-      needed: log odds that the verdict asks for.
+    `power`: squared length of the slope to a strength of 1, in units of the noise, which `num_left`
+    residuals tell. `prior`: of the strength, which is `absent` without the effect. `log_prior`: of
+    the effect, over that of the model without it.
     """
     strength = in_units(prior, PRIOR_Z)
     wide = np.gradient(strength, PRIOR_Z)  # d strength / dz

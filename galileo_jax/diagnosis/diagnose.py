@@ -255,10 +255,8 @@ def _searched(
 ) -> tuple[list[Reason], _Conclusion]:
     """Pairs and, where these or what they say is not enough, formulas, in an exact world.
 
-    `candidates` are those of single effects, compared with the data; the table has pairs, too.
-
-    Returns:
-      Why pairs were tried, and what came of it; and the conclusion.
+    `candidates` are those of single effects, compared with the data; the table has pairs, too. Why
+    these were tried, and what came of it, is said beside the conclusion.
     """
     singles = candidates
     candidates = listener.on_table(table)
@@ -326,8 +324,7 @@ def _instead(
 ) -> tuple[ImperfectWorld | None, Verdict]:
     """Another verdict where imperfections explain the data as well as what it is about.
 
-    Returns:
-      The imperfect world, None where the verdict stands in the exact one; and the verdict.
+    With it the imperfect world; None where the verdict stands in the exact one.
     """
     rough.judge.on_stage("allowing for imperfections")
     rough = rough.with_candidates(candidates)

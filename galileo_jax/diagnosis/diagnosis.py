@@ -109,6 +109,11 @@ class Verdict:
     # the formula, where the verdict is a law, or ambiguous because one does as well
     law: Law | None = None
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The hypotheses that it is about; several effects of one are joined by +."""
+        return ("+".join(self.effects),) if self.status == "named" else self.effects
+
 
 @dataclass(frozen=True)
 class Round:

@@ -20,12 +20,8 @@ from galileo_jax.inference.fit_posterior import fit_posterior, laplace_posterior
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.inference.result import (
-    IDENTIFIED_SD_Z,
-    per_mass_entries,
-    undetermined_by_mass,
-)
-from galileo_jax.inference.summarise import summary_of
+from galileo_jax.inference.result import IDENTIFIED_SD_Z, per_mass_entries, undetermined_by_mass
+from galileo_jax.inference.summarise import entry_of
 from galileo_jax.search.hypothesis import Hypothesis
 
 Entries = dict[str, dict[str, Any]]  # by parameter
@@ -60,7 +56,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             for why in diagnosis.verdict.reasons
         ],
         "could_not_see": _could_not_see(trials, diagnosis, seed),
-        "history": [_history_row(one, entries) for one, (entries, _) in rounds],
+        "history": [history_row(trials, one, seed, entries) for one, (entries, _) in rounds],
     }
     last = diagnosis.rounds[-1].hypothesis
     if last.fit.sizes is not None:
@@ -79,15 +75,14 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
         ]
     if diagnosis.each_clip:
         rows = [
-            {CALLED.get(key, key): _plain(value) for key, value in asdict(one).items()}
+            {
+                CALLED.get(key, key): value.tolist() if isinstance(value, np.ndarray) else value
+                for key, value in asdict(one).items()
+            }
             for one in diagnosis.each_clip
         ]
         document["each_clip"] = {"kind": kind_of(diagnosis.each_clip), "clips": rows}
     return document
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> Mapping[str, Any]:
@@ -103,12 +98,11 @@ def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> Map
     return unseen(trials, last.hypothesis, log_priors, seed).could_not_see
 
 
-def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
+def history_row(
+    trials: JointProblem, one: Round, seed: int, known: Entries | None = None
+) -> dict[str, Any]:
     """One round: effects, errors, p and what is said of the friction coefficients with them."""
-    return _history_row(one, _entries(trials, one.hypothesis, seed)[0])
-
-
-def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
+    entries = _entries(trials, one.hypothesis, seed)[0] if known is None else known
     error = one.comparison.error
     return {
         "effects": list(one.effects),
@@ -139,11 +133,12 @@ def _entries(
     }
     unknown = undetermined_by_mass(trials, forces)
     entries = {
-        parameter.name: {
-            **summary_of(posterior, posterior[parameter.name].reshape(-1)),
-            "unit": parameter.unit,
-            "identified": bool(spread[i] < IDENTIFIED_SD_Z) and parameter.name not in unknown,
-        }
+        parameter.name: entry_of(
+            posterior,
+            posterior[parameter.name].reshape(-1),
+            parameter.unit,
+            bool(spread[i] < IDENTIFIED_SD_Z) and parameter.name not in unknown,
+        )
         for i, parameter in enumerate(trials.parameters)
         if fit.free[i] and parameter.role != "nuisance"
     }
@@ -173,16 +168,21 @@ def _candidate(candidate: Candidate, entries: tuple[Entries, Entries]) -> dict[s
 def _missing_force(
     diagnosis: Diagnosis, missing: MissingForce, names: Sequence[str]
 ) -> dict[str, Any]:
-    best = best_formula(diagnosis.candidates)
-    is_explained = best is not None and explains(best)
-    whole = {
-        "formula": best.title if best is not None and is_explained else NO_FORMULA,
-        "share_explained": diagnosis.share_explained(best),
-    }
+    best, formula, law = best_formula(diagnosis.candidates), None, NO_FORMULA
+    if best is not None:
+        formula = {
+            "law": best.title,
+            "explains": explains(best),
+            "probability": best.probability,
+            "p_value": best.p_value,
+            "chi2_per_dof": best.error["chi2_per_dof"],
+        }
+        law = best.title if explains(best) else NO_FORMULA
+    whole = {"formula": law, "share_explained": diagnosis.share_explained(best)}
     curves = ("acceleration_m_s2", "sd_m_s2", "path_m", "speed_m_s")
     return {
         "time_s": missing.time_s.tolist(),
-        "best_formula": None if best is None else _formula(best, is_explained),
+        "best_formula": formula,
         "objects": {
             name: {key: getattr(missing, key)[i].tolist() for key in curves} | whole
             for i, name in enumerate(names)
@@ -201,14 +201,3 @@ def _friction(clips: Sequence[str], found: Sequence[Sequence[Stretch]]) -> list[
             entry = {"clip": clip, "object": name, "path_m": path_m}
             rows.append(entry | {key: [getattr(one, key) for one in own] for key in ("mean", "sd")})
     return rows
-
-
-def _formula(best: Candidate, is_explained: bool) -> dict[str, Any]:
-    """A formula that was fitted, and what it leaves."""
-    return {
-        "law": best.title,
-        "explains": is_explained,
-        "probability": best.probability,
-        "p_value": best.p_value,
-        "chi2_per_dof": best.error["chi2_per_dof"],
-    }

@@ -15,7 +15,7 @@ from galileo_jax.diagnosis.candidates import error_left, incredible
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.friction_along_way import Stretch, friction_along_way
 from galileo_jax.diagnosis.judge import Judge
-from galileo_jax.diagnosis.law_verdict import joined_names, law_verdict
+from galileo_jax.diagnosis.law_verdict import law_verdict
 from galileo_jax.diagnosis.stakes import num_expected, odds_of
 from galileo_jax.diagnosis.thresholds import CONVINCING, DECISIVE
 from galileo_jax.diagnosis.verdict import explains, ranked, without_a_name
@@ -75,7 +75,7 @@ class ImperfectWorld:
             return sure
         found = self.judge.verdict(self.table)
         is_law = {c.name for c in self.table if c.law is not None}
-        is_named = not is_law & set(joined_names(found))
+        is_named = not is_law & set(found.names)
         return found if is_named else Verdict("unknown", (), reasons=found.reasons)
 
     def is_beaten_by(self, candidates: Sequence[Candidate]) -> bool:

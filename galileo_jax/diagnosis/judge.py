@@ -41,26 +41,26 @@ class Judge:
 
     def comparison(self, hypothesis: Hypothesis) -> Comparison:
         """A hypothesis compared with the data, once."""
-        known = self.comparisons.get(hypothesis.effects)
-        if known is None or known[0] is not hypothesis.fit:
-            made = compare(hypothesis.of(self.trials), hypothesis.fit, self.seed)
-            known = self.comparisons[hypothesis.effects] = hypothesis.fit, made
-        return known[1]
+        known = self._known(hypothesis)
+        if known is None:
+            known = compare(hypothesis.of(self.trials), hypothesis.fit, self.seed)
+            self.comparisons[hypothesis.effects] = hypothesis.fit, known
+        return known
+
+    def _known(self, hypothesis: Hypothesis) -> Comparison | None:
+        """The comparison, if this fit was compared."""
+        fit, made = self.comparisons.get(hypothesis.effects, (None, None))
+        return made if fit is hypothesis.fit else None
 
     def compared(self, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
         """The candidates, ranked; the best with p-values and with what they are confounded with."""
         table = ranked(candidates)
         for c in to_compare(table, self.decisive):
             self.comparison(c.hypothesis)
-        done = [replace(c, p_value=self._p_value(c)) for c in table]
+        known = [self._known(c.hypothesis) for c in table]
+        p_values = [None if made is None else made.p_value for made in known]
+        done = [replace(c, p_value=p) for c, p in zip(table, p_values, strict=True)]
         return tuple(replace(c, confounded_with=rivals(c, done)) for c in done)
-
-    def _p_value(self, candidate: Candidate) -> float | None:
-        """As far as its fit was compared."""
-        known = self.comparisons.get(candidate.effects)
-        if known is None or known[0] is not candidate.hypothesis.fit:
-            return None
-        return known[1].p_value
 
     def verdict(self, candidates: Sequence[Candidate]) -> Verdict:
         """On a table without laws; what is named was looked at again."""
@@ -127,26 +127,20 @@ def expected_leads(
     for rival in rivals:
         its = rival.hypothesis.of(trials)
         if id(its) not in fitters:
-            fitters[id(its)] = GradientFitter(_with_observations_of(its, turned))
+            pairs = zip(its.problems, turned.problems, strict=True)
+            same = tuple(replace(a, observation=b.observation) for a, b in pairs)
+            fitters[id(its)] = GradientFitter(JointProblem(same))
         lead = own - refit(fitters[id(its)], rival.hypothesis.fit).log_evidence
         lead += candidate.log_prior - rival.log_prior
         found.append(0.5 * (lead + candidate.log_odds - rival.log_odds))
     return found
 
 
-def _with_observations_of(trials: JointProblem, seen: JointProblem) -> JointProblem:
-    """The trials, with other measurements of the same clips."""
-    pairs = zip(trials.problems, seen.problems, strict=True)
-    return JointProblem(tuple(replace(a, observation=b.observation) for a, b in pairs))
-
-
 def turned_round(trials: JointProblem, fit: GradientFit) -> JointProblem:
     """The trials as they would be with errors of the opposite sign, if the fit were the truth."""
-    theta = trials.theta(fit.z, fit.free)
-    problems = []
-    for clip, problem in enumerate(trials.problems):
+    predicted, problems = trials.simulate(trials.theta(fit.z, fit.free)), []
+    for problem, own in zip(trials.problems, predicted, strict=True):
         seen = problem.observation
-        predicted = problem.simulate(trials.of_clip(theta, clip))
-        turned = replace(seen, position_m=2 * predicted - seen.position_m)
+        turned = replace(seen, position_m=2 * own - seen.position_m)
         problems.append(replace(problem, observation=turned))
     return JointProblem(tuple(problems))

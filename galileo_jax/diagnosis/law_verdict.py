@@ -27,15 +27,8 @@ def needs_laws(verdict: Verdict, candidates: Sequence[Candidate]) -> bool:
     """
     if verdict.status == "unknown":
         return True
-    best = next(c for c in candidates if c.name in joined_names(verdict)[:1])
+    best = next(c for c in candidates if c.name in verdict.names[:1])
     return len(best.effects) > 1 or best.num_constants >= MANY_CONSTANTS
-
-
-def joined_names(verdict: Verdict) -> tuple[str, ...]:
-    """The hypotheses that a verdict is about; several effects of one are joined by +."""
-    if verdict.status == "named":
-        return ("+".join(verdict.effects),)
-    return verdict.effects
 
 
 def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> Verdict:
@@ -46,7 +39,7 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
     best effect with a name: the formula that says what the form does has to beat it. All else
     stays.
     """
-    law, names = _best_law(candidates), joined_names(verdict)
+    law, names = _best_law(candidates), verdict.names
     if verdict.form is not None and explains(best := best_named(candidates)):
         names = (best.name,)
     own = next((c for c in candidates if c.name in names), None)

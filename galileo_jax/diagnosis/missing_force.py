@@ -55,22 +55,13 @@ def views_of(trials: JointProblem, *starts: Hypothesis) -> list["View"]:
 
 
 def infer_missing_force(
-    trials: JointProblem,
-    hypothesis: Hypothesis,
-    seed: int,
-    views: Sequence["View"] | None = None,
+    trials: JointProblem, hypothesis: Hypothesis, seed: int, views: Sequence["View"] | None = None
 ) -> MissingForce:
-    """Infers the acceleration along the path that acts beyond what a hypothesis has.
+    """The acceleration along the path that acts beyond what a hypothesis has, of the first clip.
 
-    Args:
-      trials: what was diagnosed.
-      hypothesis: fitted to them. Its effects, if it has any, count as missing: of a formula that
-        explains the data all else stays.
-      seed: of the posteriors' draws.
-      views: from `views_of`, where they are there already, of whatever hypothesis.
-
-    Returns:
-      The first clip's, NaN where an object is at rest or not seen.
+    NaN where an object is at rest or not seen. The effects of the hypothesis, if it has any, count
+    as missing: of a formula that explains the data all else stays. `views`: from `views_of`, where
+    they are there already, of whatever hypothesis.
     """
     view = views[0] if views else view_of(trials, hypothesis, 0)
     acceleration, sd = _beyond(view, trials, hypothesis, np.random.default_rng([seed, 61]))
@@ -151,7 +142,7 @@ def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
         made = _with_free_acceleration(before, _spans_of(before, extended.of_clip(theta, 0)))
         extended = JointProblem((made,))
         start = np.where(extended.free(()), 0.0, np.nan)
-        start[[extended.names.index(name) for name in own.names]] = np.where(free, z, np.nan)
+        start[extended.places(own.names)] = np.where(free, z, np.nan)
         fit = _fitted(extended, start, in_all_valleys=is_last)
         theta = extended.theta(fit.z, fit.free)
     (seen,) = extended.problems
@@ -207,20 +198,15 @@ def _spans_of(problem: Problem, theta: np.ndarray) -> tuple[tuple[Span, ...], ..
     events = [start for start, _ in others]
     beyond = position[0, 0, 0] - scene.corner_m[0]
     if scene.comes_down[0] and (beyond >= 0).any():
-        events.append(float(_first_s(beyond, times)))
+        reached = int(np.argmax(beyond >= 0))
+        pair = slice(max(reached - 1, 0), reached + 1)
+        events.append(float(np.interp(0.0, beyond[pair], times[pair])))
     edges = [begin]
     for event in sorted(events):
         if event > edges[-1] + SHORTEST_S and end > event + SHORTEST_S:
             edges.append(event)
     pieces = tuple(zip(edges, [*edges[1:], end], strict=True))
     return (pieces, *((span,) for span in others))
-
-
-def _first_s(value: np.ndarray, times_s: np.ndarray) -> float:
-    """When `value` `[time]` first reaches zero."""
-    reached = int(np.argmax(value >= 0))
-    pair = slice(max(reached - 1, 0), reached + 1)
-    return float(np.interp(0.0, value[pair], times_s[pair]))
 
 
 def _along_path(problem: Problem, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -285,12 +271,10 @@ def _without_effects(
     view: View, own: JointProblem, hypothesis: Hypothesis, generator: np.random.Generator
 ) -> np.ndarray:
     """Draws of the first clip's parameters without effects, `[draw, parameter]`."""
-    fit, names = hypothesis.fit, view.trials.names
+    fit, column = hypothesis.fit, own.columns_of(0)
     draws = generator.multivariate_normal(fit.z, fit.covariance, NUM_DRAWS, method="svd")
-    z = np.zeros((NUM_DRAWS, len(names)))
-    for at, name in zip(own.columns_of(0), own.alone(0).names, strict=True):
-        if own.free(())[at]:
-            z[:, names.index(name)] = draws[:, at]
+    z, kept = np.zeros((NUM_DRAWS, len(view.trials.names))), own.free(())[column]
+    z[:, view.trials.places(own.alone(0).names)[kept]] = draws[:, column[kept]]
     return z
 
 

@@ -157,14 +157,10 @@ def because(
     words: Mapping[str, Any] | None = None,
     **numbers: float | str | None,
 ) -> Reason:
-    """The reason of a rule that fired.
+    """The reason of a rule of `TEMPLATES` that fired, about a hypothesis and its rival.
 
-    Args:
-      rule: of `TEMPLATES`.
-      hypothesis: that it is about.
-      rival: that it is compared with.
-      words: of the sentence, beside numbers and what the two are called.
-      numbers: that the rule compared, beside those of `KNOWN`.
+    `words`: of the sentence, beside numbers and what the two are called. `numbers`: that the rule
+    compared, beside those of `KNOWN`.
     """
     template = TEMPLATES[rule]
     both = {"hypothesis": hypothesis, "rival": rival}
@@ -208,13 +204,10 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
 
 
 def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float) -> Reason:
-    """Whether a clip like this one would tell the rival from the hypothesis that is named.
+    """Whether a clip like this one would tell the rival from the best, which would be named.
 
-    Args:
-      best: the hypothesis that would be named.
-      rival: another that could be confused with it.
-      expected: nats by which the rival is behind in a clip like this one, on average.
-      needed: nats by which it must be.
+    `expected`: nats by which the rival is behind in a clip like this one, on average; `needed`: by
+    which it must be.
     """
     return because(
         "told_apart" if expected >= needed else "not_told_apart",

@@ -17,7 +17,7 @@ def fit_among(fit: GradientFit, own: JointProblem, other: JointProblem) -> Gradi
     Raises:
       ValueError: the fit has a parameter that `other` has not.
     """
-    at = np.array([own.names.index(n) if n in own.names else -1 for n in other.names])
+    at = own.places(other.names)
     if np.delete(fit.free, at[at >= 0]).any():
         raise ValueError("the fit has parameters that the other model has not")
 

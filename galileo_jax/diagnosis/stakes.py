@@ -40,10 +40,7 @@ class VerdictStakes(Stakes):
         return log_prior(odds_of(self.trials, hypothesis), len(library))
 
     def log_priors_beside(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Log of the probability with one more effect, before the data, over that without it.
-
-        Of each named effect that a hypothesis does not have.
-        """
+        """By each other named effect, what it adds to `log_prior` of a hypothesis beside it."""
         own = self.log_prior(hypothesis) if hypothesis.effects else 0.0
         names = set(self.trials.all_effects) - set(hypothesis.effects) - set(FORM_NAMES)
         larger = {name: replace(hypothesis, effects=(*hypothesis.effects, name)) for name in names}
@@ -57,8 +54,6 @@ class VerdictStakes(Stakes):
         Each may still gain `MAY_STILL_GAIN` nats by that. Where the model without effects will do
         and no named effect can come to convince, on none. One with more effects than the leading
         one has paid for them: it is not behind by bad luck.
-
-        Arguments are `[hypothesis]`.
         """
         named = log_odds[~is_form].max(initial=-np.inf)
         if self.is_adequate and named + MAY_STILL_GAIN < CONVINCING:
@@ -78,11 +73,8 @@ def log_prior(odds: Sequence[float], num_effects: int) -> float:
     """Log of a hypothesis' probability before the data over that of the model without effects.
 
     All single effects together are as probable as none, and all pairs `SECOND_EFFECT_ODDS` times
-    as probable; all of a kind share alike.
-
-    Args:
-      odds: of each of its effects, how many times as likely as others it is (`Effect.odds`).
-      num_effects: in the library, forms not counted.
+    as probable; all of a kind share alike. `odds`: of each of its effects, how many times as likely
+    as others it is (`Effect.odds`). `num_effects`: in the library, forms not counted.
     """
     share = SECOND_EFFECT_ODDS ** (len(odds) - 1) / comb(num_effects, len(odds))
     return log(share) + float(np.sum(np.log(odds)))

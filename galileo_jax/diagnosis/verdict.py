@@ -63,10 +63,8 @@ def without_a_name(
     explains the data about as well; ambiguous where one does. A formula has to be better than
     imperfections are. What would have to push is no friction.
 
-    Args:
-      comparison: of the model without effects, with imperfections.
-      candidates: ranked, with imperfections, compared with the data.
-      is_friction: whether uneven friction is nowhere negative.
+    `comparison`: of the model without effects; it and the candidates are with imperfections.
+    `is_friction`: whether uneven friction is nowhere negative.
     """
     if comparison.p_value < ADEQUATE_P:
         return None
@@ -219,11 +217,10 @@ def needs_pairs(singles: Sequence[Candidate]) -> bool:
 def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     """The verdict on the whole table, without advice.
 
-    Returns:
-      Named: one hypothesis explains the data, and nothing else does about as well, nor all others
-      together, nor does it owe that to its prior alone. Ambiguous: several do; a form without a
-      name stands last, and an effect that explains the data alone is not repeated with others.
-      Unknown: only a form does, or nothing, or what does is far behind what does not.
+    Named: one hypothesis explains the data, and nothing else does about as well, nor all others
+    together, nor does it owe that to its prior alone. Ambiguous: several do; a form without a name
+    stands last, and an effect that explains the data alone is not repeated with others. Unknown:
+    only a form does, or nothing, or what does is far behind what does not.
     """
     best, explaining = candidates[0], _explaining(candidates)
     if not explaining:
@@ -335,19 +332,12 @@ def farthest(decisive: float) -> float:
 
 
 def looked_at_again(
-    verdict: Verdict,
-    named: Candidate,
-    expected: Sequence[tuple[Candidate, float]],
-    decisive: float,
+    verdict: Verdict, named: Candidate, expected: Sequence[tuple[Candidate, float]], decisive: float
 ) -> Verdict:
     """A named verdict, or ambiguous where a clip like this one does not tell a confusable from it.
 
-    Args:
-      verdict: named.
-      named: what it names.
-      expected: its confusables, and by how many nats each is behind in a clip like this one, if
-        what is named is there.
-      decisive: nats by which a rival must be behind.
+    `expected`: the confusables, and by how many nats each is behind in a clip like this one, if
+    what is named is there.
     """
     looks = tuple(reasons.told_apart(named, rival, by, decisive) for rival, by in expected)
     alike = [rival for rival, by in expected if by < decisive]
@@ -371,12 +361,10 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
     if verdict.status == "unknown":
         best = best_named(candidates)
         return best if best.log_evidence > LEAST_GAIN else None
-    names = ("+".join(verdict.effects), verdict.effects[0])
-    return next(c for c in candidates if c.name in names)
+    return next(c for c in candidates if c.name == verdict.names[0])
 
 
 def is_about_pairs(verdict: Verdict) -> bool:
     """Whether all hypotheses that a verdict is about are of several effects."""
-    if verdict.status == "named":
-        return len(verdict.effects) > 1
-    return verdict.status == "ambiguous" and all("+" in name for name in verdict.effects)
+    is_about_effects = verdict.status in ("named", "ambiguous")
+    return is_about_effects and all("+" in name for name in verdict.names)

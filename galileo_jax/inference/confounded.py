@@ -19,12 +19,8 @@ def confounded_with_gravity(
 ) -> tuple[set[str], str | None]:
     """Parameters that gravity keeps this motion from telling, and why in one sentence.
 
-    Args:
-      parameters: entries of result.json with `identified` by the width of each alone.
-      has_surface: whether the objects slide on something.
-
-    Returns:
-      names, gravity's own among them; empty where it is determined, or not inferred.
+    Gravity itself is among them; none where it is determined, or not inferred. `parameters`:
+    entries of result.json with `identified` by the width of each alone.
     """
     if "gravity" not in parameters:
         return set(), None

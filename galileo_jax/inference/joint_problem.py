@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import chdtrc
 
 from galileo_jax.inference.problem import Problem
@@ -123,19 +123,18 @@ class JointProblem:
         return np.array([p.absent for p in self.parameters])
 
     def free(self, effects: Sequence[str]) -> np.ndarray:
-        """Which parameters a hypothesis leaves free, `[parameter]`.
-
-        Args:
-          effects: names of those that are there, of the models' effects.
+        """Which parameters a hypothesis with these effects leaves free, `[parameter]`.
 
         Raises:
           ValueError: the models have no effect of that name.
         """
-        known, brought, is_given = self._brought
-        if unknown := [name for name in effects if name not in known]:
-            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(known)}")
-        absent = [known[name] for name in known if name not in effects]
-        return ~is_given & ~brought[absent].any(axis=0)
+        brought = self._brought
+        if unknown := [name for name in effects if name not in brought]:
+            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(brought)}")
+        found = np.array([p.role != "given" for p in self.parameters])
+        for name in brought.keys() - set(effects):
+            found &= ~brought[name]
+        return found
 
     def brought_by(self, effect: str) -> np.ndarray:
         """Where the parameters of one of the models' effects stand, its strengths first: indices.
@@ -143,32 +142,20 @@ class JointProblem:
         Raises:
           ValueError: the models have no effect of that name.
         """
-        known, brought, _ = self._brought
-        if effect not in known:
-            raise ValueError(f"effects not in the model: {effect}; there: {sorted(known)}")
-        return np.flatnonzero(brought[known[effect]])
+        if effect not in self._brought:
+            raise ValueError(f"effects not in the model: {effect}; there: {sorted(self._brought)}")
+        return np.flatnonzero(self._brought[effect])
 
     @cached_property
-    def _brought(self) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
-        """What each effect brings.
-
-        Returns:
-          Rows of the effects by name; the parameters that each brings, `[effect, parameter]`; and
-          those that are given, `[parameter]`.
-        """
-        named: dict[str, set[str]] = {}
-        for problem in self.problems:
-            scene = problem.model.scene.surroundings
-            for effect in problem.model.effects:
-                found = named.setdefault(effect.name, set())
-                found.update(p.name for p in effect.parameters(scene))
-        brought = np.zeros((len(named), len(self.parameters)), bool)
-        is_given = np.zeros(len(self.parameters), bool)
+    def _brought(self) -> dict[str, np.ndarray]:
+        """By the effect's name, which parameters it brings, `[parameter]`."""
+        found: dict[str, np.ndarray] = {}
         for problem, column in zip(self.problems, self.columns, strict=True):
-            for parameter, joint in zip(problem.parameters, column, strict=True):
-                brought[:, joint] = [parameter.name in own for own in named.values()]
-                is_given[joint] = parameter.role == "given"
-        return {name: row for row, name in enumerate(named)}, brought, is_given
+            scene, names = problem.model.scene.surroundings, problem.model.names
+            for effect in problem.model.effects:
+                own = found.setdefault(effect.name, np.zeros(len(self.parameters), bool))
+                own[[column[names.index(p.name)] for p in effect.parameters(scene)]] = True
+        return found
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -210,6 +197,16 @@ class JointProblem:
     def of_clip(self, theta: np.ndarray, clip: int) -> np.ndarray:
         """The parameters of one clip's model, `[..., model parameter]`."""
         return np.asarray(theta)[..., self.columns[clip]]
+
+    def simulate(self, theta: Float[np.ndarray, " parameter"]) -> list[np.ndarray]:
+        """What the camera would see of each clip: `[object, axis, frame]`, m."""
+        each = enumerate(self.problems)
+        return [problem.simulate(self.of_clip(theta, clip)) for clip, problem in each]
+
+    def places(self, names: Sequence[str]) -> Int[np.ndarray, " name"]:
+        """Where parameters of these names stand; -1 where there is none of that name."""
+        where = {name: i for i, name in enumerate(self.names)}
+        return np.array([where.get(name, -1) for name in names])
 
     def alone(self, clip: int) -> "JointProblem":
         """One of the clips."""

@@ -48,24 +48,21 @@ def metropolis_posterior(
     have not converged after `FIRST_STEPS`, what they have drawn so far tunes a second run, from
     where they are, in coordinates and with proposals that suit it; it alone is returned.
 
+    Draws are in the parameters' units: of the posterior of `trials`, noise scales included; where
+    the fit has sizes of imperfections, integrated over these. They have converged when the main
+    parameters that the fit found identified, and the mass ratio, have R-hat and ESS as asked for.
+
     Args:
-      trials: the target is their posterior, noise scales included; where the fit has sizes of
-        imperfections, integrated over these.
+      trials: what was fitted.
       fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long, both runs together.
       num_chains: how many.
-      starts: `[chain, parameter]`, where they begin, in z, led along the valley as proposals
-        are; default: dispersed in it.
-      checkpoint: file that interrupted chains go on from; see `samplers.sample`. That of a
-        second run is beside it.
-      identity: of what is sampled; a checkpoint of anything else is refused.
+      starts: `[chain, parameter]`, in z, led along the valley; default: dispersed in it.
+      checkpoint: as of `samplers.sample`; that of a second run is beside it.
+      identity: as of `samplers.sample`.
       on_block: called with the progress.
-
-    Returns:
-      Draws in the parameters' units. Converged when the main parameters that the fit found
-      identified, and the mass ratio, have R-hat and ESS as asked for.
     """
     residuals, key = Residuals(trials), jax.random.key(seed)
     valley = valley_round(fit, residuals)
@@ -75,21 +72,26 @@ def metropolis_posterior(
 
     def run(
         valley: Valley, begin: np.ndarray, mean: np.ndarray, covariance: np.ndarray,
-        part: Settings, is_second: bool,
+        part: Settings, before: int = 0,
     ) -> Posterior:  # fmt: skip
-        before, file = 0, checkpoint
-        if is_second:
-            before = total - part.warmup_steps - part.max_steps
-            file = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
+        """Draws of w after `before` steps: of none in the first run."""
+
+        def report(state: Progress) -> None:
+            if on_block is not None:
+                on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
+
+        file = checkpoint
+        if before and checkpoint:
+            file = checkpoint.with_name(f"{checkpoint.name}.second")
         return sample(
-            jax.random.fold_in(key, 1) if is_second else key,
+            jax.random.fold_in(key, 1) if before else key,
             SAMPLERS[sampler].from_gaussian(jnp.asarray(mean), jnp.asarray(covariance)),
             density_of(trials, fit, valley),
             jnp.asarray(begin),
             trials.names,
             settings=part,
             monitor=lambda w: watch(valley(w)),
-            on_block=_of_both_runs(on_block, before, total),
+            on_block=report,
             checkpoint=file,
             identity=identity,
         )
@@ -99,29 +101,18 @@ def metropolis_posterior(
     else:
         begin = valley.straight(starts)
     first, second = _parts(settings)
-    posterior = run(valley, begin, np.zeros(dim), np.eye(dim), first, False)
+    posterior = run(valley, begin, np.zeros(dim), np.eye(dim), first)
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     if second is not None and not posterior.is_converged:
         w = posterior.draws
         later, last = w[:, w.shape[1] // 2 :].reshape(-1, dim), w[:, -1]
-        before, (valley, mean, covariance) = valley, learned(valley, later)
-        begin = last if valley is before else valley.straight(before(last))
-        posterior = run(valley, begin, mean, covariance, second, True)
+        old, (valley, mean, covariance) = valley, learned(valley, later)
+        begin = last if valley is old else valley.straight(old(last))
+        before = first.warmup_steps + first.max_steps
+        posterior = run(valley, begin, mean, covariance, second, before)
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda w: trials.theta(valley(w)), trials.names)
-
-
-def _of_both_runs(
-    on_block: Callable[[Progress], None] | None, before: int, total: int
-) -> Callable[[Progress], None]:
-    """Tells `on_block` the progress of a run that begins after `before` steps of `total`."""
-
-    def report(state: Progress) -> None:
-        if on_block is not None:
-            on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
-
-    return report
 
 
 def learned(valley: Valley, w: np.ndarray) -> tuple[Valley, np.ndarray, np.ndarray]:

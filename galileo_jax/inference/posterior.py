@@ -99,8 +99,7 @@ class Posterior:
     def worth(self, values: np.ndarray) -> float:
         """How many independent draws the posterior's are worth for a function of them.
 
-        Args:
-          values: `[chain * draw]`, the function at each draw, chain after chain.
+        `values`: `[chain * draw]`, the function at each draw, chain after chain.
         """
         if ESS in self.provenance:
             return float(self.provenance[ESS])
@@ -156,11 +155,10 @@ class Posterior:
         Raises:
           InputError: missing, unreadable, or of another origin; names the file.
         """
-        path = Path(path)
-        if not path.is_file():
+        if not Path(path).is_file():
             raise InputError(f"{path}: no such file")
         try:
-            return cls._read(path)
+            return cls._read(Path(path))
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         except (OSError, ValueError, KeyError) as error:

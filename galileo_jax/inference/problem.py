@@ -182,14 +182,9 @@ class Problem:
     ) -> Any:
         """What follows from the motion with each of `theta`.
 
-        Args:
-          theta: as of `simulate_batch`.
-          then: maps parts of the batch, as large as programs are compiled for: `(theta, position,
-            velocity, *rows)`, motions as of `motion`, to a PyTree of arrays `[part, ...]`.
-          *rows: more arguments of `then`, `[batch, ...]`.
-
-        Returns:
-          What `then` of the whole batch would, as NumPy arrays.
+        `then` maps parts of the batch, as large as programs are compiled for: `(theta, position,
+        velocity, *rows)`, motions as of `motion` and `rows` `[batch, ...]`, to a PyTree of arrays
+        `[part, ...]`. Returned is what it would of the whole batch, as NumPy arrays.
         """
         if isinstance(self.engine, EngineJax):
             return self.engine.each(theta, self.last_seen_s(theta), then, *rows)
@@ -200,19 +195,13 @@ class Problem:
         self, theta: Float[np.ndarray, "batch parameter"]
     ) -> Float[np.ndarray, " batch"]:
         """When the objects are last seen, s since the release: no rollout need last longer."""
-        named, scene = self.model.by_name(theta), self.model.scene.surroundings
         times = np.repeat(self.observation.times_s[:, None], len(theta), axis=1)
-        for effect in self.model.effects + self.model.nuisances:
-            times = np.asarray(effect.time(times, named, scene))
-        return times.max(axis=0, initial=0.0)
+        return since_release(self.model, theta, times).max(axis=0, initial=0.0)
 
     def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
-        """Whitened residuals, unit normal if the model is right.
+        """Whitened residuals `[..., object * 2 * frame]`, unit normal if the model is right.
 
         `predicted_m`: `[..., object, 2, frame]`. `noise_scale`: on the tracker's errors.
-
-        Returns:
-          `[..., object * 2 * frame]`.
         """
         difference = self.data.observed_m - predicted_m
         return self.data.whiten_batch(difference, noise_scale)
@@ -225,12 +214,9 @@ class Problem:
         All imperfections are of their priors' medians in it, whatever sizes were found: d is the
         same linear function of the residuals r, and what it leaves falls as models get better.
 
-        Args:
-          predicted_m: `[object, axis, frame]`.
-          is_usual: else imperfections are of the sizes that were found, as part of the model.
-
-        Returns:
-          the same shape; the prediction in an exact world, and where imperfections have no place.
+        The prediction itself in an exact world, and where imperfections have no place.
+        `predicted_m`: `[object, axis, frame]`. `is_usual`: else imperfections are of the sizes that
+        were found, as part of the model.
         """
         if self.sizes is None:
             return predicted_m
@@ -266,17 +252,21 @@ def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:
         for parameter in problem.parameters:
             if parameter.role != "nuisance" and not parameter.per_clip:
                 found[parameter.name] = joined(found.get(parameter.name, parameter), parameter)
-    return tuple(_sharing(problem, found) for problem in problems)
+    sharing = []
+    for problem in problems:
+        if others := tuple(found[p.name] for p in problem.parameters if found.get(p.name, p) != p):
+            model = replace(problem.model, shared=others)
+            problem = replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+        sharing.append(problem)
+    return tuple(sharing)
 
 
-def _sharing(problem: Problem, found: Mapping[str, Parameter]) -> Problem:
-    shared = tuple(
-        found[p.name] for p in problem.parameters if p.name in found and p != found[p.name]
-    )
-    if not shared:
-        return problem
-    model = replace(problem.model, shared=shared)
-    return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+def since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """The clip's times as the time since the release, s; `theta` is `[..., parameter]`."""
+    named = model.by_name(theta)
+    for effect in model.effects + model.nuisances:
+        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
+    return times_s
 
 
 class Kind(NamedTuple):

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax import __version__
 from galileo_jax.inference.confounded import confounded_with_gravity
@@ -23,9 +24,10 @@ from galileo_jax.inference.per_mass import (
 )
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.summarise import summary_of
+from galileo_jax.inference.summarise import entry_of
 from galileo_jax.model.effects.effect import true_surroundings
 from galileo_jax.model.parameters import inverse, prior_deviations
+from galileo_jax.observation.observation import Observation
 
 # In z every prior is a standard normal: above this less than half comes from the data.
 IDENTIFIED_SD_Z = 0.5
@@ -49,24 +51,18 @@ def velocity_error(
 ) -> dict[str, float]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
-    `predicted_m`: of each clip `[object, 2, frame]`, the fitted centres.
-
-    Returns:
-      rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and
-      l2 (root of the summed squares, per profile as in the thesis).
+    rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and l2 (root
+    of the summed squares, per profile as in the thesis). `predicted_m`: of each clip `[object, 2,
+    frame]`, the fitted centres.
     """
     residuals, noises = [np.zeros(0)], [np.zeros(0)]
     for problem, predicted in zip(problems, predicted_m, strict=True):
-        observation = problem.observation
-        dt = np.diff(observation.times_s)
-        both = observation.mask[:, 1:] & observation.mask[:, :-1]
-        left = observation.measured_part(observation.position_m - predicted)
-        residual, variance = np.diff(left, axis=-1) / dt, observation.measured_variance_m2
-        both = np.broadcast_to(both[:, None], residual.shape)
-        if observation.is_turning:  # radians are no metres
-            residual, variance, both = residual[:, :2], variance[:, :2], both[:, :2]
-        residuals.append(residual[both])
-        noises.append(((variance[..., 1:] + variance[..., :-1]) / dt**2)[both])
+        seen = problem.observation
+        residual, noise = velocity_residuals(seen, predicted)
+        both = np.broadcast_to((seen.mask[:, 1:] & seen.mask[:, :-1])[:, None], residual.shape)
+        axes = slice(2 if seen.is_turning else None)  # radians are no metres
+        residuals.append(residual[:, axes][both[:, axes]])
+        noises.append(noise[:, axes][both[:, axes]])
     values, noise = np.concatenate(residuals), np.concatenate(noises)
     if not values.size:
         return dict.fromkeys(("rmse", "noise", "l1", "l2"), float("nan"))
@@ -78,17 +74,23 @@ def velocity_error(
     }
 
 
+def velocity_residuals(
+    seen: Observation, predicted_m: Float[np.ndarray, "object axis frame"]
+) -> tuple[Float[np.ndarray, "object axis step"], Float[np.ndarray, "object axis step"]]:
+    """Measured less predicted velocities, m/s, and their variances by the stated errors alone."""
+    dt, variance = np.diff(seen.times_s), seen.measured_variance_m2
+    left = seen.measured_part(seen.position_m - predicted_m)
+    return np.diff(left, axis=-1) / dt, (variance[..., 1:] + variance[..., :-1]) / dt**2
+
+
 def distance_error(
     problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
 ) -> dict[str, float]:
     """How far the points that were followed are from where the fit has them.
 
-    `predicted_m`: of each clip `[object, axis, frame]`, the fitted centres.
-
-    Returns:
-      rms_mm: the root mean square of that distance, of all objects and frames, mm; NaN where
-      nobody knows how long a metre is. rms_percent_of_way: the same in per cent of the longest
-      way between two places of an object; NaN where nothing moves.
+    rms_mm: the root mean square of that distance, of all objects and frames; NaN where nobody knows
+    how long a metre is. rms_percent_of_way: the same in per cent of the longest way between two
+    places of an object; NaN where nothing moves. `predicted_m`: as of `velocity_error`.
     """
     squares, way_m = [np.zeros(0)], 0.0
     for problem, predicted in zip(problems, predicted_m, strict=True):
@@ -122,16 +124,12 @@ def error_of(
     The same in result.json, compare.json and diagnosis.json: what the model leaves over, in
     units of the noise that the tracker states, which is the same for every model of a track.
 
-    Args:
-      trials: the clips.
-      theta: in the parameters' units, noise scales last.
-      num_fitted: how many numbers' worth the parameters were fitted with, nuisances left out.
-      pull: of the nuisances, which are data, too: the sum of their squared `prior_deviations`.
-      is_usual: see `Problem.followed`.
+    `num_fitted`: how many numbers' worth the parameters were fitted with, nuisances left out.
+    `pull`: of the nuisances, which are data, too: the sum of their squared `prior_deviations`.
+    `is_usual`: see `Problem.followed`.
     """
     predictions, chi2, count = [], pull, 0.0
-    for clip, problem in enumerate(trials.problems):
-        predicted = problem.simulate(trials.of_clip(theta, clip))
+    for problem, predicted in zip(trials.problems, trials.simulate(theta), strict=True):
         chi2 += float(np.sum(problem.tracking_errors(predicted) ** 2))
         count += float(problem.data.degrees(1.0))
         predictions.append(problem.followed(predicted, is_usual))
@@ -158,11 +156,7 @@ def _told(
 ) -> dict[str, dict[str, Any]]:
     """Entries of derived quantities by their draws and units, after the data and before."""
     return {
-        name: {
-            **summary_of(posterior, values),
-            "unit": unit,
-            "identified": _is_told(values, before[name][0]),
-        }
+        name: entry_of(posterior, values, unit, _is_told(values, before[name][0]))
         for name, (values, unit) in after.items()
     }
 
@@ -182,12 +176,9 @@ def _is_told(after: np.ndarray, before: np.ndarray) -> bool:
     """Whether draws are much narrower than those of the priors; of what is positive, in ratio."""
     if before.min() > 0 and after.min() > 0:
         after, before = np.log(after), np.log(before)
-    return _width(after) < IDENTIFIED_SD_Z * _width(before)
-
-
-def _width(values: np.ndarray) -> float:
-    """Of the central two thirds of draws."""
-    return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
+    # Of the central two thirds of draws.
+    width, of_prior = (np.diff(np.quantile(draws, [0.16, 0.84]))[0] for draws in (after, before))
+    return bool(width < IDENTIFIED_SD_Z * of_prior)
 
 
 def _derived_by_laws(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, Any]]:
@@ -274,9 +265,9 @@ def _entries(
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
     for parameter, draws, sd in zip(trials.parameters, posterior.flat().T, spread, strict=True):
         if parameter.role not in UNSHOWN:
-            is_told = {"unit": parameter.unit, "identified": bool(sd < IDENTIFIED_SD_Z)}
             room = "nuisances" if parameter.role == "nuisance" else "parameters"
-            table[room][parameter.name] = summary_of(posterior, draws) | is_told
+            entry = entry_of(posterior, draws, parameter.unit, bool(sd < IDENTIFIED_SD_Z))
+            table[room][parameter.name] = entry
     return table
 
 
@@ -292,8 +283,7 @@ def _ratios(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, A
         prior_sd = float(np.hypot(*(prior.sd for prior in priors)))  # pyright: ignore
         logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
-        entry = summary_of(posterior, values)
-        derived[name] = {**entry, "unit": "1", "identified": is_identified}
+        derived[name] = entry_of(posterior, values, "1", is_identified)
     return derived
 
 

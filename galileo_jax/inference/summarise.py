@@ -18,9 +18,8 @@ def summarise(draws: Float[np.ndarray, " draw"], worth: float | None = None) -> 
         a quantile at p: half the distance between those at the 16 % and 84 % points of
             Beta(n p + 1, n (1 - p) + 1)
 
-    Args:
-      draws: all of the same weight.
-      worth: n, how many independent draws they are worth; None: as many as there are.
+    `draws`: all of the same weight. `worth`: n, how many independent draws they are worth; None: as
+    many as there are.
 
     Source: A. Vehtari and others, Rank-normalization, folding, and localization: an improved
     R-hat, Bayesian Analysis 16 (2021), 667, section 4 (10.1214/20-BA1221).
@@ -48,3 +47,10 @@ def summarise(draws: Float[np.ndarray, " draw"], worth: float | None = None) -> 
 def summary_of(posterior: Posterior, values: Float[np.ndarray, " draw"]) -> dict:
     """`summarise` of a parameter or a function of the parameters, chain after chain."""
     return summarise(values, posterior.worth(values))
+
+
+def entry_of(
+    posterior: Posterior, values: Float[np.ndarray, " draw"], unit: str, identified: bool
+) -> dict:
+    """The same with its unit and whether the data tell it: an entry of result.json."""
+    return {**summary_of(posterior, values), "unit": unit, "identified": identified}

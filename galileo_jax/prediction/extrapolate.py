@@ -10,9 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from galileo_jax import __version__
-from galileo_jax.comparison.phases import since_release
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Problem, since_release
 from galileo_jax.inference.summarise import summarise
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
@@ -131,9 +130,8 @@ def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.nd
 def answers(fit: Fitted, motions: Motions, seconds: float, seed: int) -> dict[str, Any]:
     """Will it slide, how far, where does it stop, does it hit: prediction.json.
 
-    Returns:
-      Probabilities are shares of the draws; quantities are mean, sd and central 95 % interval
-      over the draws to which they apply (rest: those that stop), null where there are none.
+    Probabilities are shares of the draws; quantities are mean, sd and central 95 % interval over
+    the draws to which they apply (rest: those that stop), null where there are none.
     """
     surroundings = fit.problem.model.scene.surroundings
     clip_end_s = float(fit.problem.observation.times_s[-1])

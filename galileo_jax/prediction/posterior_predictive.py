@@ -5,12 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.comparison.phases import Phase, phases, phases_of
-from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.extrapolate import (
     GRID_S,
     Fitted,
-    Motions,
     as_measured,
     draw_theta,
     hit_s,
@@ -58,17 +56,12 @@ def posterior_predictive(fit: Fitted, seed: int) -> PosteriorPredictive:
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
     drawn = drawn + observation.offset_m(drawn)[..., None]
+    hits = [float(hit_s(centre, surroundings, i)[0]) for i in range(len(surroundings.names) - 1)]
     return PosteriorPredictive(
         observation=observation,
         position_m=drawn,
         offset_m=observation.offset_m(shown),
         residuals=np.where(is_measured, errors, np.nan),
         phases=tuple(phases_of(labels, frames) for labels in phases(problem, best[0])),
-        hits_s=_hits(centre, surroundings),
+        hits_s=tuple(None if np.isnan(one) else one for one in hits),
     )
-
-
-def _hits(motions: Motions, surroundings: Surroundings) -> tuple[float | None, ...]:
-    """When each object but the last hits the next in the first of the motions."""
-    when = [float(hit_s(motions, surroundings, i)[0]) for i in range(len(surroundings.names) - 1)]
-    return tuple(None if np.isnan(one) else one for one in when)

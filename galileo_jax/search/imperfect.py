@@ -60,7 +60,11 @@ def fit_worlds(
     fitter = GradientFitter(trials)
 
     def is_enough(fit: GradientFit) -> bool:
-        return fitter.is_explained(fit) or is_usual(with_imperfections(trials, fit, to_rest=False))
+        if fitter.is_explained(fit):
+            return True
+        rough = with_imperfections(trials, fit, to_rest=False).fit
+        is_usual = rough.sizes is not None and not rough.sizes.unusual
+        return is_usual and rough.code is Code.CONVERGED
 
     exact = World(trials, best_fit(fitter, seed, on_stage, is_enough=is_enough))
     on_stage("sizing imperfections")
@@ -83,14 +87,6 @@ def fit_worlds(
     best, other = (rough, exact) if probability > 0.5 else (exact, rough)
     share = min(probability, 1 - probability)
     return Worlds(best, exact.fit, other if share > EXCLUDED else None, share)
-
-
-def is_usual(world: World) -> bool:
-    """Whether a fit converged and all imperfections are of sizes that are usual."""
-    fit = world.fit
-    if fit.sizes is None or fit.code is not Code.CONVERGED:
-        return False
-    return not fit.sizes.unusual
 
 
 def with_imperfections(

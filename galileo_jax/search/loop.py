@@ -43,15 +43,11 @@ def search(
     moves: Sequence[Move] = tuple(MOVES.values()),
     on_round: Callable[[Sequence[Start]], None] = lambda _: None,
 ) -> Table:
-    """The table with all that the moves find, up to so many effects at once.
+    """The table with all that the moves find, of hypotheses of up to `most` effects.
 
-    Args:
-      table: what is known.
-      most: effects of a hypothesis; 0: the one model that is fitted.
-      on_entry: called with a table and each of its rows that is new or better, as soon as that is.
-      starts: where to look first, beside what the moves propose.
-      moves: that propose.
-      on_round: called before each round with what was proposed.
+    Of 0 effects it is the one model that is fitted. `on_entry`: called with a table and each of its
+    rows that is new or better, as soon as that is. `starts`: where to look first, beside what the
+    moves propose. `on_round`: called before each round with what was proposed.
     """
     table = replace(table, most_effects=most)
     for _ in range(MOST_ROUNDS):

@@ -33,8 +33,7 @@ def score_tests(
         z = d.r / |d|,   d = the slope of the whitened residuals r, made orthogonal to those of
                              the parameters that are there already
 
-    Returns:
-      `[candidate]`, of the last effect of each, without a refit; signed strengths by size.
+    `[candidate]`, of the last effect of each, without a refit; signed strengths by size.
     """
     here = trials.theta(base.z, base.free)
     strengths = [strength_of(trials, effects[-1]) for effects in candidates]

@@ -45,11 +45,8 @@ def beside(
     The shapes that match best, and scattered ones: of one effect round the parent in `NUM_WAYS`
     ways; of several, which are many hypotheses, over all priors.
 
-    Args:
-      table: what is known.
-      move: that proposes them.
-      wanted: parents, and the effects of the hypotheses; those asked for already are left out.
-      is_scattered: whether scattered starts are wanted; else the best match is all.
+    `move`: that proposes them. `wanted`: parents, and the effects of the hypotheses; those asked
+    for already are left out. `is_scattered`: else the best match is all.
     """
     wanted = table.not_asked(move, wanted)
     if not wanted:
@@ -82,9 +79,8 @@ def beside_a_formula(table: Table, formula: Hypothesis) -> list[Start]:
     missed: its valley is narrow, or lies far from where the model without effects is.
     """
     trials, base = table.trials, table.base
-    others = formula.of(trials)
-    at = [others.names.index(name) if name in others.names else -1 for name in trials.names]
-    z = np.where(np.array(at) >= 0, formula.fit.z[at], 0.0)
+    at = formula.of(trials).places(trials.names)
+    z = np.where(at >= 0, formula.fit.z[at], 0.0)
     jacobian = formula.fit.jacobian[:, at[: len(trials.model_parameters)]]
     free = base.fit.free
     fit = replace(
@@ -186,9 +182,9 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
     size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
     starts = np.tile(base.z[:count], (size, 1))
     starts[:, new] = ndtri(np.clip(latin_hypercube(size, len(new), generator), 0.02, 0.98))
-    parameters, rest = trials.model_parameters, absent_z(trials)
-    nuisance = np.array([p.role == "nuisance" for p in parameters])
-    main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]
+    rest = absent_z(trials)
+    nuisance = np.array([p.role == "nuisance" for p in trials.model_parameters])
+    main = ~nuisance & base.free[:count]
     spread = generator.standard_normal((size, int(main.sum())))
     way = np.arange(size) % NUM_WAYS
     # Near the base fit; with the nuisances that it bent let go; and with all else let go, too.
@@ -200,10 +196,7 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
 def scattered_starts(trials: JointProblem, free: np.ndarray, num: int, seed: int) -> np.ndarray:
     """A Latin hypercube over all but the nuisances, which are where they are absent.
 
-    `free`: `[model parameter]`, those that are not pinned.
-
-    Returns:
-      `[start, model parameter]`, z.
+    `[start, model parameter]`, z; `free`: `[model parameter]`, those that are not pinned.
     """
     is_scattered = free & np.array([p.role != "nuisance" for p in trials.model_parameters])
     return scattered_round(trials, absent_z(trials)[None], is_scattered[None], num, seed)
@@ -214,11 +207,8 @@ def scattered_round(
 ) -> np.ndarray:
     """Starts round centres in turn, of which some parameters are known and others scattered.
 
-    `centres`: `[centre, model parameter]`, z. `is_scattered`: `[centre, model parameter]`, those
-    that are not known.
-
-    Returns:
-      `[start, model parameter]`, z.
+    `[start, model parameter]`, z, as `centres` are; `is_scattered`: `[centre, model parameter]`,
+    those that are not known.
     """
     turn = np.arange(num) % len(centres)
     some = np.flatnonzero(is_scattered.any(axis=0)).tolist()

@@ -14,13 +14,7 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.numerics.line_segments import NEAR, nearest_frames
 from galileo_jax.numerics.random_patterns import alone
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import (
-    WOBBLE_S,
-    WOBBLE_SD_M,
-    camera,
-    offsets,
-    wander,
-)
+from galileo_jax.similarity.discrepancy import WOBBLE_S, WOBBLE_SD_M, camera, offsets, wander
 from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
 
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre

@@ -26,15 +26,11 @@ def deviations(
     jumps: Float[np.ndarray, "step object"] | None = None,
     shown: Sequence[int] = (PLACE,),
 ) -> Float[np.ndarray, "frame shown frame shown"]:
-    """The covariance of deviations along the path, m^2, and of what else is shown of the state.
+    """The covariance of deviations along the path, m^2, and of what else is `shown` of the state.
 
-    Args:
-      motion: as measured.
-      length_m: over which friction varies.
-      friction: standard deviation of its coefficient.
-      pushed: covariance of white accelerations in each step, m^2/s^3.
-      jumps: standard deviation of each speed's jump in a step, m/s.
-      shown: of each object; the places of all objects first, then the next of all.
+    The places of all objects come first, then the next of all. Friction varies over `length_m`, by
+    the standard deviation `friction` of its coefficient. `pushed`: covariance of white
+    accelerations in each step, m^2/s^3. `jumps`: standard deviation of each speed's, m/s.
     """
     count, frames = motion.speed_m_s.shape
     size, steps = NUM * count, frames - 1

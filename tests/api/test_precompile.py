@@ -24,7 +24,7 @@ def test_a_likely_clip_is_compiled_as_the_tracked_one(tmp_path):
         Residuals(make_joint_problem([clip], [seen])).clips[0]
         for seen in (likely, run.problem.observation)
     )
-    assert one.kind == other.kind
+    assert one.problem.kind == other.problem.kind
     assert shapes(one.arrays) == shapes(other.arrays)
     assert one.problem.model.num_records == other.problem.model.num_records
 

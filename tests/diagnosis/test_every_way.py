@@ -9,7 +9,7 @@ import pytest
 from galileo_jax.diagnosis.laws import fit_formulas, rank_formulas
 from galileo_jax.diagnosis.laws.fit_formulas import fitted_laws
 from galileo_jax.diagnosis.laws.grammar import Structure
-from galileo_jax.diagnosis.laws.rank_formulas import NUM_OF_FAMILY, of_family
+from galileo_jax.diagnosis.laws.rank_formulas import NUM_OF_FAMILY, suggestions
 from tests.diagnosis.test_rank_formulas import FACTOR, RANGES, TIMES, clip_that_lacks, made
 
 
@@ -26,7 +26,7 @@ def clips(monkeypatch) -> Any:
 
 def test_a_family_has_more_ways_than_are_screened(clips):
     family = Structure("push", False, (FACTOR["slope_q"],)).family
-    found = of_family(clips, family)
+    found = suggestions(clips, family)
     ways = {(one.structure.nature, one.structure.is_on_all) for one in found}
     assert {("push", False), ("friction", False)} <= ways and len(ways) > NUM_OF_FAMILY
     assert {one.structure.family for one in found} == {family}
@@ -51,8 +51,12 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
             for one in found
         ]
 
-    monkeypatch.setattr(fit_formulas, "suggestions", lambda clips, wanted: family[:2])
-    monkeypatch.setattr(fit_formulas, "of_family", lambda clips, name: family)
+    screened = {None: family[:2], "pull_q": family}
+
+    def suggestions(clips, name=None):
+        return screened[name]
+
+    monkeypatch.setattr(fit_formulas, "suggestions", suggestions)
     monkeypatch.setattr(fit_formulas, "_fitted", fitted)
     monkeypatch.setattr(fit_formulas, "without_twins", lambda laws: laws)
     none: Any = None

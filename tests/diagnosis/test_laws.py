@@ -123,7 +123,7 @@ def test_constants_of_the_same_name_keep_their_factor():
 
 
 def test_as_a_physicist_writes_it():
-    assert DRAG.text({"n": 1.5}) == "a = -c |v|^1.5 sign(v), all objects"
+    assert DRAG.text({"c": 0.62, "n": 1.5}) == "a = -0.62 |v|^1.5 sign(v), all objects"
 
 
 def test_the_file_is_an_effect_of_its_own(tmp_path, monkeypatch):

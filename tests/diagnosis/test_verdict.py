@@ -555,6 +555,13 @@ def test_a_pair_that_is_named_is_added_whole():
     assert to_add(Verdict("ambiguous", (PAIR, "air_drag+stribeck")), pairs) is pairs[0]
 
 
+def test_a_pair_is_added_though_one_of_its_effects_that_is_contradicted_ranks_before_it():
+    table = ranked([candidate("air_drag", 61.0, p_value=0.001), candidate(PAIR, 60.0)])
+    named = verdict_of(table, DECISIVE)
+    assert told(named) == ("named", ("air_drag", "rolling"), None)
+    assert to_add(named, table) is table[1]
+
+
 def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
     form, helps = candidate(FORM, 60.0), candidate("air_drag", 8.0 + EDGE, log_prior=-2.0)
     assert to_add(Verdict("unknown", (), FORM), (form, helps)) is helps

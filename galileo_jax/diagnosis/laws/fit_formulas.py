@@ -20,7 +20,7 @@ from galileo_jax.diagnosis.laws.rank_formulas import (
     NUM_LAWS,
     Shape,
     Suggestion,
-    of_family,
+    chosen,
     ranges_of,
     suggestions,
 )
@@ -69,13 +69,7 @@ class FittedLaw:
     @property
     def text(self) -> str:
         """The formula with its constants: `a = -0.62 |v|^1.5 sign(v), all objects`."""
-        values = self.constants()
-        text = self.structure.text(values).replace("(1 + c ", "(1 + {c} ")
-        size = values["c"]
-        if self.structure.nature == "friction":
-            return text.replace("+ {c}", f"{'-' if size < 0 else '+'} {abs(size):.3g}")
-        sign = -size if self.structure.nature.startswith("drag") else size
-        return text.replace("= -c ", "= c ").replace("= c ", f"= {sign:.3g} ", 1)
+        return self.structure.text(self.constants())
 
 
 def fitted_laws(
@@ -95,12 +89,12 @@ def fitted_laws(
     says of it.
     """
     clips = [LinearisedClip.of(view) for view in views]
-    found = suggestions(clips, wanted)
+    found = chosen(suggestions(clips), wanted)
     on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
     made = _fitted(trials, near, found, clips)
     known = {name_of(law.structure) for law in made}
     if made:
-        others = [*_simpler(made[0]), *of_family(clips, made[0].structure.family)]
+        others = [*_simpler(made[0]), *suggestions(clips, made[0].structure.family)]
         new = [one for one in others if name_of(one.structure) not in known]
         on_stage(f"looking for a law: fitting the best formula in {len(new[:NUM_LAWS])} other ways")
         made += _fitted(trials, near, new[:NUM_LAWS], clips)
@@ -156,19 +150,12 @@ def _fitted(
     sources = [class_source(one.structure, ranges) for one in found]
     extended = _with_laws(trials, [one.structure for one in found], sources)
     fitter, count = GradientFitter(extended), len(extended.model_parameters)
-    where = [extended.names.index(name) if name in extended.names else -1 for name in trials.names]
-    z = np.zeros(len(extended.names))
-    for old, new in enumerate(where):
-        if new >= 0 and near.fit.free[old]:
-            z[new] = near.fit.z[old]
-    starts, free, owner = [], [], []
-    for i, one in enumerate(found):
-        is_free = extended.free([name_of(one.structure)])[:count]
-        for start in _starts(extended, z, one, clips):
-            starts.append(np.where(is_free, start[:count], 0.0))
-            free.append(is_free)
-            owner.append(i)
-    fits = fitter.fit_from(np.stack(starts), np.stack(free), np.array(owner))
+    at = trials.places(extended.names)
+    z = np.where((at >= 0) & near.fit.free[at], near.fit.z[at], 0.0)
+    starts = [_starts(extended, z, one, clips) for one in found]
+    owner = np.repeat(np.arange(len(found)), [len(own) for own in starts])
+    free = np.stack([extended.free([name_of(one.structure)])[:count] for one in found])
+    fits = fitter.fit_from(np.concatenate(starts)[:, :count], free[owner], owner)
     best = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
     for i in best:
         fits[i] = max(fits[i], refit(fitter, fits[i]), key=lambda fit: fit.log_evidence)

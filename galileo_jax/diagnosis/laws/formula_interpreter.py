@@ -140,12 +140,7 @@ class OneLaw(Share):
 
 
 class ActingFormulas(ActingLaws):
-    """Of a model whose effects are proposed formulas.
-
-    Args:
-      model: of the clip.
-      structures: by the formulas' names.
-    """
+    """Of a model whose effects are proposed formulas, `structures` by their names."""
 
     def __init__(self, model: Model, structures: Mapping[str, Structure]):
         super().__init__(model)

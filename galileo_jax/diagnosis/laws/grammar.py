@@ -202,8 +202,13 @@ class Structure:
         return parts[0] if len(parts) == 1 else " * ".join(f"({part})" for part in parts)
 
     def text(self, values: Mapping[str, float] | None = None) -> str:
-        """As a physicist writes it, constants by value or by name."""
+        """As a physicist writes it, constants and the strength `c` by value or by name."""
         names = {name: name if values is None else f"{values[name]:.3g}" for name in self.constants}
+        along, against, more = "c", "-c", "+ c"
+        if values is not None:
+            c = values["c"]
+            along, against = f"{c:.3g}", f"{-c:.3g}"
+            more = f"{'-' if c < 0 else '+'} {abs(c):.3g}"
         parts = [
             factor.text.format(**{name: names[own] for name, own in mine.items()})
             for factor, mine in zip(self.factors, self.own_names, strict=True)
@@ -211,10 +216,10 @@ class Structure:
         shape = " ".join(parts).replace("- -", "+ ")
         whom = "all objects" if self.is_on_all else "object 1"
         head = {
-            "push": f"a = c {shape}",
-            "drag": f"a = -c {shape} sign(v)",
-            "drag_force": f"F = -c {shape} sign(v)",
-            "friction": f"k (1 + c {self._from_release(shape, values)})",
+            "push": f"a = {along} {shape}",
+            "drag": f"a = {against} {shape} sign(v)",
+            "drag_force": f"F = {against} {shape} sign(v)",
+            "friction": f"k (1 {more} {self._from_release(shape, values)})",
         }[self.nature]
         return f"{head}, {whom}"
 
@@ -266,10 +271,7 @@ def without_one_factor(
 ) -> list[tuple[Structure, dict[str, float]]]:
     """What a formula of two factors is without either of them: one may do nothing.
 
-    `values` are those of its constants, and its strength as `c`.
-
-    Returns:
-      The simpler formulas, each with its own.
+    `values` are those of its constants, and its strength as `c`; each that is found has its own.
     """
     found = []
     if len(structure.factors) == 1:

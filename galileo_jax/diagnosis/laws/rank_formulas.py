@@ -48,28 +48,17 @@ class Suggestion:
     score: float  # nats, see above
 
 
-def suggestions(
-    clips: Sequence[LinearisedClip], wanted: Collection[Shape] = ()
-) -> list[Suggestion]:
-    """The formulas that promise most, best first."""
-    return chosen(_suggested(clips), wanted)
-
-
-def of_family(clips: Sequence[LinearisedClip], family: str) -> list[Suggestion]:
-    """Every formula of a family, whatever it acts by and on whom, best first."""
-    return sorted(_suggested(clips, family), key=lambda one: -one.score)
-
-
-def _suggested(clips: Sequence[LinearisedClip], family: str | None = None) -> list[Suggestion]:
-    """All formulas that show, or those of one family."""
+def suggestions(clips: Sequence[LinearisedClip], family: str | None = None) -> list[Suggestion]:
+    """All formulas that show, or those of one family, by whatever and on whom; best first."""
     scene = clips[0].view.model.scene.surroundings
     ranges = ranges_of(clips)
-    return [
+    found = [
         one
         for structure in structures(scene.has_surface, len(scene.names))
         if family in (None, structure.family)
         and (one := suggestion_of(clips, structure, ranges)) is not None
     ]
+    return sorted(found, key=lambda one: -one.score)
 
 
 def chosen(found: Sequence[Suggestion], wanted: Collection[Shape] = ()) -> list[Suggestion]:
@@ -187,10 +176,7 @@ def _apart(gain: np.ndarray, grid: Mapping[str, np.ndarray]) -> list[int]:
 def _hilltops(gain: np.ndarray, along: np.ndarray) -> list[int]:
     """The points of a grid that are the best at their value of one constant and beat both beside.
 
-    Both are `[point of the grid]`, `along` values of the constant.
-
-    Returns:
-      Points, the best first.
+    The best first. Both are `[point of the grid]`, `along` values of the constant.
     """
     values = np.unique(along)
     best = [max(np.flatnonzero(along == value), key=lambda i: gain[i]) for value in values]

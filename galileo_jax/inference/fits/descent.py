@@ -145,11 +145,8 @@ def secants(
 
     As it was where the cost does not bend upwards along the step (y^T step <= 0).
 
-    Args:
-      second: before; made smaller where residuals became so.
-      step: of the parameters, z.
-      turned: (J_there - J_here)^T r_there.
-      change: of the cost's gradient, y.
+    `second`: before; made smaller where residuals became so. `step`: of the parameters, z.
+    `turned`: (J_there - J_here)^T r_there. `change`: of the cost's gradient, y.
     """
 
     def along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -167,6 +164,15 @@ def secants(
     found = sized + both + np.swapaxes(both, 1, 2) - twice
     is_known = (up > 0) & np.isfinite(found).all(axis=(1, 2))
     return np.where(is_known[:, None, None], found, second)
+
+
+def _turned(here: Slopes, there: Slopes) -> Float[np.ndarray, "point parameter"]:
+    """(J_there - J_here)^T r_there; `there` may have fewer columns."""
+    width, turned = there.index.shape[1], np.zeros(there.index.shape)
+    for before, after, white in zip(here.jacobian, there.jacobian, there.white, strict=True):
+        more = np.swapaxes(after - before[:, :, :width], 1, 2)
+        turned += (more @ white[..., None])[..., 0]
+    return there.among_all(turned)
 
 
 def _tells_better(
@@ -292,9 +298,9 @@ class Descent:
             if self.is_smooth and num_steps and len(active) <= FEW:
                 is_better = _tells_better(own, new, bends[active], beside)
                 rows = active[better]
-                second[rows] = self._secants(
-                    beside[better], slopes.take(rows), found, own, new, better
-                )
+                step, change = new.z[better] - own.z[better], (new.gradient - own.gradient)[better]
+                turned = _turned(slopes.take(rows), found)
+                second[rows] = secants(beside[better], step, turned, change)
                 beside = second[active]
                 is_better &= _is_convex(own.normal + beside) & _is_convex(new.normal + beside)
                 beside = np.where(is_better[:, None, None], beside, 0.0)
@@ -331,13 +337,11 @@ class Descent:
         """The cost round proposals; of those that cost more than where they set off no slopes.
 
         A proposal in three is refused, and its slopes would be most of the work; of few proposals
-        they are taken all the same, and tell `widths`.
+        they are taken all the same, and tell `widths`. Returned are the cost; which proposals have
+        slopes; and these.
 
         `there`: the proposals. `own`: where they set off. `widths`: `[point, model parameter]`, of
         all points; those of `active` are changed. `active`: `[proposal]`, which points they are of.
-
-        Returns:
-          The cost; `[proposal with slopes]`, which have; and these.
         """
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)
@@ -352,24 +356,6 @@ class Descent:
         found = quadratic(slopes, there.z[better])
         new.gradient[better], new.normal[better] = found.gradient, found.normal
         return new, better, slopes
-
-    def _secants(
-        self,
-        second: np.ndarray,
-        here: Slopes,
-        found: Slopes,
-        own: Quadratic,
-        new: Quadratic,
-        rows: np.ndarray,
-    ) -> np.ndarray:
-        """`secants` of proposals `rows` of `own` and `new`; `here`, `found`: slopes of these."""
-        width, turned = found.index.shape[1], np.zeros(found.index.shape)
-        for before, after, white in zip(here.jacobian, found.jacobian, found.white, strict=True):
-            more = np.swapaxes(after - before[:, :, :width], 1, 2)
-            turned += (more @ white[..., None])[..., 0]
-        step = new.z[rows] - own.z[rows]
-        change = new.gradient[rows] - own.gradient[rows]
-        return secants(second, step, found.among_all(turned), change)
 
     def slopes(self, points: Batch, widths: np.ndarray, motions: Motions | None = None) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
@@ -414,16 +400,11 @@ def polish(
     """Descends again and again, each time with noise scales that suit the residuals.
 
     Each round begins with no damping to speak of, so that one that was stuck in a curved valley
-    sets off anew: settled is who gains less than `settled` nats in all of a round.
+    sets off anew: settled is who gains less than `settled` nats in all of a round, of at most
+    `max_steps`, in which no noise scale drifts by more than `drift`.
 
-    Args:
-      descent: of the trials.
-      points: where the search ended.
-      owner: `[point]`, whose each is.
-      settled: nats.
-      max_steps: of one round.
-      lowest: as in what was returned, of other points polished before.
-      drift: of a noise scale, in a round: more has not settled.
+    `points`: where the search ended. `owner`: `[point]`, whose each is. `lowest`: as in what was
+    returned, of other points polished before.
     """
     z, noise = points.z.copy(), points.noise.copy()
     count, size = z.shape

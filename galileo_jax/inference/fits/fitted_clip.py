@@ -6,7 +6,7 @@ import numpy as np
 
 from galileo_jax.inference.fits.kernels import ClipArrays
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.problem import Kind, Problem
+from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.runtime.batching import FRAMES, SPARE_MODES, rounded_up
 from galileo_jax.runtime.device_cache import OnDevice
@@ -40,11 +40,6 @@ class FittedClip:
             host,
             OnDevice(host),
         )
-
-    @property
-    def kind(self) -> Kind:
-        """What its programs are compiled for."""
-        return self.problem.kind
 
     @property
     def arrays(self) -> ClipArrays:

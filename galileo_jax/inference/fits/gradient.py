@@ -34,11 +34,7 @@ from galileo_jax.inference.fits.laplace import Code as Code
 from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
 from galileo_jax.inference.fits.laplace import laplace_fits, points_of
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Sides
-from galileo_jax.inference.joint_problem import (
-    NOISE_SCALE_RANGE,
-    JointProblem,
-    noise_explains,
-)
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem, noise_explains
 from galileo_jax.runtime.batching import side_by_side
 
 MANY = 64  # points of a usual batch
@@ -65,12 +61,8 @@ class GradientFitter:
     """Descends on the residuals of trials, for any hypotheses.
 
     Of arguments `z` and `free` (`JointProblem.free`) are `[point, model parameter]`, and `owner`
-    `[point]` is which hypothesis each point belongs to, from 0.
-
-    Attributes:
-      trials: what is fitted.
-      residuals: of the trials.
-      is_smooth: whether motion is smooth at every scale, as the rigid engine's is.
+    `[point]` is which hypothesis each point belongs to, from 0. It `is_smooth` where motion is so
+    at every scale, as the rigid engine's is.
     """
 
     def __init__(self, trials: JointProblem, settled_nats: float = SETTLED_NATS):
@@ -85,10 +77,9 @@ class GradientFitter:
         return Descent(self.residuals, self.trials.coarse_steps, self.is_smooth, sides)
 
     def compile(self, with_races: bool = False) -> None:
-        """Compiles (or reads from the cache) all parts, so that `fit` only computes.
+        """Compiles (or reads from the cache) all parts, so that fits only compute.
 
-        Args:
-          with_races: what many hypotheses at once need, too.
+        `with_races`: what many hypotheses at once need, too.
         """
         one, many = (np.zeros((n, self._count)) for n in (1, MANY))
         descent, parts = self._descent(), list[Callable[[], Any]]()
@@ -205,11 +196,7 @@ class GradientFitter:
         return Batch(np.where(free, z, 0.0), free, np.tile(noise, (len(z), 1)))
 
     def _polish(
-        self,
-        points: Batch,
-        owner: np.ndarray,
-        lowest: float = np.inf,
-        settled: float | None = None,
+        self, points: Batch, owner: np.ndarray, lowest: float = np.inf, settled: float | None = None
     ) -> tuple[dict[int, GradientFit], float]:
         """Fits by the row of the point from which each came, and the least cost.
 

@@ -98,16 +98,13 @@ def weighed(
     most: int,
     enough: float,
 ) -> WeighedDraws:
-    """Weighed draws of the posterior of a hypothesis.
+    """Weighed draws of the posterior of a hypothesis, `num` at once, a rollout each.
 
-    Args:
-      fits: of the hypothesis, the best of each valley.
-      residuals: of the trials that were fitted.
-      seed: same seed, same draws.
-      density: its logarithm at `[point, parameter]`, up to a constant.
-      num: of draws at once, a rollout each.
-      most: of draws in all; more than `num` only while too few of them count.
-      enough: draws of the posterior itself that they must be worth.
+    More than these only until they are worth `enough` draws of the posterior itself, and `most` in
+    all. Same seed, same draws.
+
+    `fits`: of the hypothesis, the best of each valley. `residuals`: of the trials that were fitted.
+    `density`: its logarithm at `[point, parameter]`, up to a constant.
     """
     proposals, shares = list[Proposal](), list[float]()
     for fit in fits:

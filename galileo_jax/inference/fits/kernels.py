@@ -97,13 +97,12 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic, before:
       is_first: `[point]`, that `there` is no proposal but the start.
       here: the points' costs.
       there: those of the proposals, where these were before they were bent.
-      before: `[point, model parameter, model parameter]`, the curvature beside `normal` with which
-        the proposals were made.
+      before: the curvature beside `normal` with which the proposals were made.
       now: the same for the next ones.
 
     Returns:
-      The next size; `[point]`, whether `there` is accepted; the next steps `[point, model
-      parameter]`, z, straight ahead; and `[point]`, what these promise to lower the cost by.
+      The next size; whether `there` is accepted; the next steps, z, straight ahead; and what these
+      promise to lower the cost by.
     """
     import equinox as eqx
     import optimistix as optx  # traced programs are kept: most calls need none of these

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from galileo_jax.inference.fits.descent import Polished
 from galileo_jax.inference.fits.kernels import FAILED
-from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost, quadratic
+from galileo_jax.inference.fits.residuals import Batch, Residuals, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.numerics.normal_matrix import inverse
@@ -79,52 +79,39 @@ def points_of(fits: Sequence[GradientFit]) -> Batch:
 
 
 def laplace_fits(trials: JointProblem, residuals: Residuals, found: Polished) -> list[GradientFit]:
-    """The normal approximations round modes.
-
-    `found`: the modes.
-    """
+    """The normal approximations round the modes that were found."""
     slopes = residuals.slopes(found.points, found.widths, sides="open")
     normal = quadratic(slopes, found.points.z).normal
-    slopes = slopes._replace(jacobian=[slopes.among_all(j, axis=2) for j in slopes.jacobian])
-    return [_laplace_fit(trials, residuals, found, slopes, own, i) for i, own in enumerate(normal)]
-
-
-def _laplace_fit(
-    trials: JointProblem,
-    residuals: Residuals,
-    found: Polished,
-    slopes: Slopes,
-    normal: np.ndarray,
-    i: int,
-) -> GradientFit:
-    """That of mode i, whose J^T J + 1 is `normal`."""
-    points = found.points
-    z, scale, clips = points.z[i], points.noise[i], residuals.clips
-    white = [w[i] for w in slopes.white]
-    covariance = _covariance(normal, points.free[i], scale, residuals)
-    free = np.append(points.free[i], np.ones(len(scale), bool))
-    failed = max(float(np.abs(w).max()) for w in white) >= FAILED
-    code = Code.CONVERGED if found.is_settled[i] else Code.STEP_LIMIT
-    rows = [clip.unpadded(j[i]) for clip, j in zip(clips, slopes.jacobian, strict=True)]
+    jacobian = [slopes.among_all(own, axis=2) for own in slopes.jacobian]
     is_nuisance = np.array([p.role == "nuisance" for p in trials.model_parameters])
-    pulled = points.free[i] & is_nuisance
-    return GradientFit(
-        z=np.append(z, np.log(scale) / NOISE_SD),
-        free=free,
-        covariance=covariance,
-        chi2=sum(
-            float(np.sum(errors_at(w[None], s[None], np.ones(1), clip.whitening) ** 2))
+    clips, fits = residuals.clips, list[GradientFit]()
+    for i, (z, is_free, scale) in enumerate(zip(*found.points, strict=True)):
+        white = [w[i] for w in slopes.white]
+        covariance = _covariance(normal[i], is_free, scale, residuals)
+        free = np.append(is_free, np.ones(len(scale), bool))
+        failed = max(float(np.abs(w).max()) for w in white) >= FAILED
+        code = Code.CONVERGED if found.is_settled[i] else Code.STEP_LIMIT
+        rows = [clip.unpadded(j[i]) for clip, j in zip(clips, jacobian, strict=True)]
+        errors = [
+            errors_at(w[None], s[None], np.ones(1), clip.whitening)
             for w, s, clip in zip(white, scale, clips, strict=True)
-        ),
-        log_evidence=_log_evidence(z, scale, white, covariance[np.ix_(free, free)], residuals),
-        num_values=trials.num_values,
-        steps=found.widths[i],
-        jacobian=np.concatenate(rows),
-        code=Code.FAILED if failed else code,
-        stats={"num_rollouts": residuals.num_rollouts},
-        pull=float(np.sum(prior_deviations(trials.model_parameters, z) ** 2)),
-        num_pulled=float(np.sum(1 - np.diag(covariance)[: len(z)][pulled])),
-    )
+        ]
+        fit = GradientFit(
+            z=np.append(z, np.log(scale) / NOISE_SD),
+            free=free,
+            covariance=covariance,
+            chi2=sum(float(np.sum(own**2)) for own in errors),
+            log_evidence=_log_evidence(z, scale, white, covariance[np.ix_(free, free)], residuals),
+            num_values=trials.num_values,
+            steps=found.widths[i],
+            jacobian=np.concatenate(rows),
+            code=Code.FAILED if failed else code,
+            stats={"num_rollouts": residuals.num_rollouts},
+            pull=float(np.sum(prior_deviations(trials.model_parameters, z) ** 2)),
+            num_pulled=float(np.sum(1 - np.diag(covariance)[: len(z)][is_free & is_nuisance])),
+        )
+        fits.append(fit)
+    return fits
 
 
 def _covariance(

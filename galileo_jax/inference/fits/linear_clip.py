@@ -124,9 +124,8 @@ def linear_clips(trials: JointProblem, fit: GradientFit) -> list[LinearClip]:
 def averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row value"]:
     """Rows of measured values; neighbours of many are averaged, independent errors staying so.
 
-    Args:
-      values: `[row, ...]`, whitened, as many in each row as `Problem.whiten` gives.
-      problem: a place that is known along a line only is one value, not two.
+    `values`: `[row, ...]`, whitened, as many in each row as `Problem.whiten` gives. A place that is
+    known along a line only is one value, not two.
     """
     seen = is_measured(problem.data.inverse_root)
     own = np.repeat(np.arange(seen.shape[0] * seen.shape[1]), seen.shape[2])[seen.reshape(-1)]

@@ -7,11 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.fitted_clip import FittedClip
-from galileo_jax.inference.fits.kernels import (
-    Quadratic,
-    seen_slopes_batch,
-    white_batch,
-)
+from galileo_jax.inference.fits.kernels import Quadratic, seen_slopes_batch, white_batch
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 
@@ -72,9 +68,7 @@ class Slopes(NamedTuple):
 class Residuals:
     """Of all clips of the trials; values of a clip as in `Problem.whiten`, in padded frames.
 
-    Attributes:
-      clips: ready for compiled code.
-      num_rollouts: made so far.
+    `clips` are ready for compiled code; `num_rollouts` were made so far.
     """
 
     def __init__(self, trials: JointProblem):
@@ -104,11 +98,7 @@ class Residuals:
         return [in_chunks(MOTIONS, _white(clip), *motion, noise) for clip, motion, noise in each]
 
     def slopes(
-        self,
-        points: Batch,
-        steps: np.ndarray,
-        sides: Sides,
-        motions: Motions | None = None,
+        self, points: Batch, steps: np.ndarray, sides: Sides, motions: Motions | None = None
     ) -> Slopes:
         """By differences, where the motion changes; in parameters of clock and camera by JAX.
 
@@ -154,7 +144,7 @@ class Residuals:
         seen = _free_index(is_seen[:, own])
         white, slopes = in_chunks(
             POINTS,
-            lambda *rows: seen_slopes_batch(clip.kind, *rows, clip.arrays),
+            lambda *rows: seen_slopes_batch(clip.problem.kind, *rows, clip.arrays),
             *(share.of(theta), seen, points.noise[:, c], *moved),
         )
         jacobian = np.zeros((*white.shape, index.shape[1]))
@@ -188,8 +178,8 @@ def _open(each: Float[np.ndarray, "side row value"]) -> Float[np.ndarray, "row v
 
 def _white(clip: FittedClip) -> Callable[..., Any]:
     """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
-    own = clip.problem.share.of
-    return lambda theta, *part: white_batch(clip.kind, own(theta), *part, clip.arrays)
+    kind, own = clip.problem.kind, clip.problem.share.of
+    return lambda theta, *part: white_batch(kind, own(theta), *part, clip.arrays)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:

@@ -29,11 +29,7 @@ from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.samplers import checkpoint as checkpoints
 from galileo_jax.inference.samplers.checkpoint import History
 from galileo_jax.inference.samplers.program import compiled
-from galileo_jax.inference.samplers.sampler import (
-    AbstractSampler,
-    LogDensity,
-    TunedSampler,
-)
+from galileo_jax.inference.samplers.sampler import AbstractSampler, LogDensity, TunedSampler
 
 GAIN_EXPONENT = 0.6
 """Robbins-Monro gains (t + 1)^-0.6: slow enough to get there, fast enough to settle."""

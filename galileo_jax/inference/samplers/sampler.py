@@ -90,9 +90,7 @@ class TunedSampler(AbstractSampler):
     def rescaled(self, info: Any, gain: jax.Array) -> Self:
         """One Robbins-Monro step of the scale: log s += gain (acceptance - target).
 
-        Arguments:
-          info: of a turn of all chains, `[chain, step]`.
-          gain: 0 leaves the sampler exactly as it is.
+        `info`: of a turn of all chains, `[chain, step]`. A gain of 0 leaves the sampler as it is.
         """
         change = gain * (jnp.mean(info.acceptance_rate[:, 0]) - TARGET_ACCEPTANCE)
         scale = self.log_scale + change.astype(self.log_scale.dtype)
@@ -112,12 +110,8 @@ def metropolis_hastings(
 ) -> tuple[State, Info]:
     """One step: y ~ q(. | x), kept with min(1, p(y) q(x | y) / (p(x) q(y | x))), by BlackJAX.
 
-    Arguments:
-      key: for the proposal and its acceptance.
-      state: x and log p(x).
-      log_density: log p; called once, with y. A y of NaN density is never kept.
-      propose: draws y, `(key, x)`.
-      proposal_log_density: log q(y | x) of `(x, y)`; None where q is symmetric.
+    `log_density`: log p; called once, with y. A y of NaN density is never kept. `propose`: draws y,
+    `(key, x)`. `proposal_log_density`: log q(y | x) of `(x, y)`; None where q is symmetric.
     """
 
     # What is easy to get wrong (1.7.1): log q(to | from), and swapped arguments fail silently.

@@ -57,18 +57,12 @@ class TossSolution:
 
 
 def fit_poses(
-    tosses: Sequence[Poses],
-    edge_m: float,
-    gravity: float,
-    window_s: float | None = None,
+    tosses: Sequence[Poses], edge_m: float, gravity: float, window_s: float | None = None
 ) -> TossSolution:
     """Fits cubes of one size.
 
-    Args:
-      tosses: their poses.
-      edge_m: as declared; the fit may change it, and gravity, by some per cent.
-      gravity: as declared, m/s^2.
-      window_s: how far after the first impact the fit looks. None: to the last of `STAGES_S`.
+    `edge_m`, and `gravity` in m/s^2, are as declared; the fit may change them by some per cent.
+    `window_s`: how far after the first impact the fit looks. None: to the last of `STAGES_S`.
 
     Raises:
       InputError: no toss flies for long enough before its first impact.
@@ -136,16 +130,10 @@ def solve_window(
     middle: np.ndarray,
     prior_sd: np.ndarray,
 ) -> Solution:
-    """Fits the frames before `until` of each toss.
+    """Fits the frames before `until` `[toss]` of each toss, from `common` and `own` `[toss, 12]`.
 
-    Args:
-      seen: `[toss, ...]`, see `padded`.
-      start: first guesses, `[toss, ...]`.
-      until: `[toss]`.
-      common: where the search begins, as `own`.
-      own: `[toss, 12]`.
-      middle: of the prior of what all share.
-      prior_sd: its widths.
+    `seen` (see `padded`) and `start`, first guesses, are `[toss, ...]`; `middle` and `prior_sd` are
+    of the prior of what all share.
     """
     is_in = np.arange(seen.position_m.shape[1]) < np.asarray(until)[:, None]
     scale = np.repeat([1 / PLACE_SD_M, 1 / TURN_SD_RAD], 3) * is_in[..., None]

@@ -37,7 +37,6 @@ class Solution:
     own: np.ndarray  # `[toss, 12]`
     covariance: np.ndarray  # `[common, common]`, of the common ones, over tosses
     residuals: np.ndarray  # `[toss, frame, 6]`, whitened; 0 where nothing counts
-    loss: float  # what was made small
     has_converged: bool  # whether the last step gained next to nothing
 
 
@@ -89,7 +88,7 @@ def solve(
         if has_converged:
             break
     sandwich = arrow_at(left, common, own).sandwich()
-    return Solution(common, own, sandwich, left, loss, has_converged)
+    return Solution(common, own, sandwich, left, has_converged)
 
 
 class _Arrow:
@@ -123,8 +122,7 @@ class _Arrow:
 
     def step(self, damped: float) -> tuple[np.ndarray, np.ndarray]:
         """The damped step of what all share `[common]` and of the starts `[toss, 12]`."""
-        own = self.bb + damped * np.eye(self.bb.shape[-1]) * self.bb
-        solved = np.linalg.solve(own, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+        solved = self._starts_solved(damped)
         whole = self.aa.sum(axis=0) + np.diag(self.prior)
         matrix = whole + damped * np.diag(np.diag(whole))
         matrix = matrix - np.sum(self.ab @ solved[..., :-1], axis=0)
@@ -132,9 +130,14 @@ class _Arrow:
         moved = np.linalg.solve(matrix, right)
         return moved, solved[..., -1] - solved[..., :-1] @ moved
 
+    def _starts_solved(self, damped: float) -> np.ndarray:
+        """Each toss's start by what is common, and by its own pull in the last column."""
+        own = self.bb + damped * np.eye(self.bb.shape[-1]) * self.bb
+        return np.linalg.solve(own, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+
     def sandwich(self) -> np.ndarray:
         """The covariance of what all share, from the scatter of the tosses' gradients."""
-        solved = np.linalg.solve(self.bb, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
+        solved = self._starts_solved(0.0)
         each = self.aa - self.ab @ solved[..., :-1]
         bread = pinvh(each.sum(axis=0) + np.diag(self.prior))
         scores = self.ga - (self.ab @ solved[..., -1:])[..., 0]

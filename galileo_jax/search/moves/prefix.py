@@ -66,7 +66,7 @@ def phases(trials: JointProblem) -> Iterator[JointProblem]:
     are seen until two of them are nearest to each other.
     """
     meetings = [_meeting(problem) for problem in trials.problems]
-    if all(frame >= LEAST_FRAMES for frame in meetings):
+    if min(meetings) >= LEAST_FRAMES:
         yield JointProblem(tuple(map(_until, trials.problems, meetings)))
     for index in range(1, len(trials.problems[0].observation.names)):
         if (short := before_moving(trials, index)) is not None:
@@ -117,16 +117,17 @@ def before_moving(trials: JointProblem, index: int) -> JointProblem | None:
 
     `index`: of the object, along the travel.
     """
-    short = [_before_moving(problem, index) for problem in trials.problems]
-    found = [problem for problem in short if problem is not None]
-    return JointProblem(tuple(found)) if len(found) == len(short) else None
+    ends = [_moving(problem, index) for problem in trials.problems]
+    if min(ends) < LEAST_FRAMES:
+        return None
+    return JointProblem(tuple(map(_until, trials.problems, ends)))
 
 
-def _before_moving(problem: Problem, index: int) -> Problem | None:
+def _moving(problem: Problem, index: int) -> int:
+    """The frame in which an object begins to move; 0 where it was hardly seen."""
     seen = problem.observation
     if seen.mask[index].sum() < LEAST_FRAMES:
-        return None
+        return 0
     away = seen.first_away(index)
     # It has been on its way for less than a frame when that is first seen.
-    first = len(seen.times_s) if away is None else away - 1
-    return None if first < LEAST_FRAMES else _until(problem, first)
+    return len(seen.times_s) if away is None else away - 1
