@@ -49,6 +49,18 @@ def test_what_is_let_go_in_the_clip_does_not(release_s, drag_per_s, seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
+def test_a_brake_on_the_way_is_no_start_in_motion(seed):
+    """A magnet from .35 to .55 m."""
+    time = np.arange(0.0, 1.2, 1e-4)
+    place, speed = np.zeros(len(time)), np.zeros(len(time))
+    for i in range(len(time) - 1):
+        brake = 4.0 * speed[i] * (0.35 < place[i] < 0.55)
+        speed[i + 1] = speed[i] + 1e-4 * (A_M_S2 - brake)
+        place[i + 1] = place[i] + 1e-4 * speed[i]
+    assert start_speed(went(np.interp(np.arange(70) / FPS, time, place), seed)) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("held_s", [0.0, 0.5])
 def test_what_goes_up_first_moves_against_the_way(held_s, seed):
     """Pushed up a slope at 1.2 m/s before the clip or in it, and slides down again."""

@@ -25,6 +25,7 @@ EARLY = 0.5  # of the way
 FEWEST, TERMS = 9, 5  # places, and numbers that describe them
 TERMS_OF_FEW = 3  # without b and c
 NEAR_FOOT = 0.25  # of the way down a ramp to its table
+PLAIN = 4.0  # of the variance of the errors: what they leave where they are twice those stated
 CLEAR = 5.0  # standard deviations
 SURE = 3.0  # the same, where it is clear that it is not let go at once
 RELEASES = 48  # instants between which the best is looked for
@@ -38,11 +39,17 @@ class StartSpeed(NamedTuple):
 
 
 def start_speed(observation: Observation) -> StartSpeed | None:
-    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
+    """How fast object 1 moves where it is first seen; None where it is let go later, or at once.
+
+    Of so short a part that what acts later on the way does not bend the description.
+    """
     early = _first_half(observation)
     if early is None:
         return None
     fit = early.moving()
+    while len(early.times_s) > 2 * FEWEST and np.sum(fit.left**2) > PLAIN * len(early.times_s):
+        early = early.first(len(early.times_s) // 2)
+        fit = early.moving()
     moving, moves_cost = fit.solution, float(np.sum(fit.left**2))
     size = early.scatter(moves_cost)
     sd_m_s = math.sqrt(size * fit.inverse[1, 1])
@@ -103,6 +110,10 @@ class _Way(NamedTuple):
     way_m: np.ndarray
     sd_m: np.ndarray
     sign: float  # -1: it first goes against the way of all
+
+    def first(self, count: int) -> "_Way":
+        """Its first places."""
+        return _Way(self.times_s[:count], self.way_m[:count], self.sd_m[:count], self.sign)
 
     @property
     def terms(self) -> int:
