@@ -94,7 +94,6 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
     offset = seen.offset_m(fitted)[..., None]
     turned = pitch(np.nan_to_num(predicted.transpose(2, 0, 1)), scene.surroundings).T
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
-    sign = 1.0 if clip.direction == "right" else -1.0
     corners = [outline(clip, scene, i) for i in range(len(seen.names))]
     return Motion(
         problem.name,
@@ -107,8 +106,8 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
         np.where(shown, white, np.nan),
         _in_pixels(clip, measured),
         _in_pixels(clip, predicted + offset),
-        -sign * turned,
-        tuple(one * (sign, -1.0) * scale for one in corners),
+        -clip.sign * turned,
+        tuple(one * (clip.sign, -1.0) * scale for one in corners),
     )
 
 

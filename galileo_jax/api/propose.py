@@ -168,8 +168,7 @@ def _size(mover: Mover, turned_rad: float = 0.0) -> Point:
 def _turn(clip: Clip) -> float:
     """How an object on the ramp stands in the picture, clockwise, rad."""
     assert clip.ramp_angle_deg is not None  # measured
-    angle = math.radians(clip.ramp_angle_deg)
-    return angle if clip.direction == "right" else -angle
+    return clip.sign * math.radians(clip.ramp_angle_deg)
 
 
 def _with_height(clip: Clip, before_px: float, now_px: float) -> Clip:
@@ -184,7 +183,7 @@ def _with_height(clip: Clip, before_px: float, now_px: float) -> Clip:
 def _line(clip: Clip, size: Point) -> tuple[tuple[float, float, float, float], Point | None]:
     """The ramp's surface below the first object, from above it down to the foot, px."""
     right, into = rotation(_turn(clip)).T  # along the ramp, and from the object into it
-    down = right if clip.direction == "right" else -right
+    down = clip.sign * right
     start = np.asarray(clip.objects[0].point_px) + into * size[1] / 2
     if clip.origin_px is not None:
         foot = np.asarray(clip.origin_px)

@@ -148,7 +148,7 @@ def measure(clip: Clip) -> Measurement:
     needs_slope, way = scenario.has_ramp and clip.ramp_angle_deg is None, None
     # The object's outline stands along the ramp: a first look, as a disc, tells how steep.
     is_first_look = needs_slope and clip.video is not None
-    if scenario.has_ramp and not scenario.has_table and scenario.angle_deg is None:
+    if scenario.is_sloped and not scenario.has_table:
         clip = _downhill(clip, _seen(_as_discs(clip) if is_first_look else clip), told)
     if is_first_look:
         clip = _inclined(clip, _seen(_as_discs(clip)))

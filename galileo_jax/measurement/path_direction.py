@@ -136,7 +136,7 @@ def way_text(clip: Clip, way: OtherWay) -> str:
         return f"{clip.objects[0].name} swings along a line that {path}, not straight down"
     declared = (
         f"ramp_angle_deg: {way.declared_deg:g} is declared"
-        if scenario.has_ramp and scenario.angle_deg is None
+        if scenario.is_sloped
         else f"{'level' if scenario.has_ramp else 'straight down'} is what scenario "
         f"{clip.scenario} says"
     )

@@ -48,7 +48,7 @@ class Marks:
     def has_ramp(self) -> bool:
         """Whether the scenario has a slope."""
         scenario = SCENARIOS[self.scenario]
-        return scenario.has_ramp and scenario.angle_deg is None
+        return scenario.is_sloped
 
     @property
     def has_scale(self) -> bool:
