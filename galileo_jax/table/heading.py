@@ -78,8 +78,8 @@ def split_heading(rows: Rows) -> Heading:
     commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
     above = [(line, _uncommented(row)) for line, row in rows[:start]]
     body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
-    while not _has_number(body[-1][1]) or is_of_all_rows(body[-1][1][0]):
-        body.pop()  # words below the table: a remark, or the mean of a column
+    while _is_below(body):
+        body.pop()
     counts = [_num_titles(row) for _, row in above]
     if max(counts, default=0) < 2:
         above = _listed_titles(above, max(len(row) for _, row in body)) or above
@@ -245,6 +245,17 @@ def _with_clock_above(titles: list[str], above: list[list[str]]) -> list[str]:
 
 def _is_value(cell: str) -> bool:
     return is_number(cell) or is_time(cell)
+
+
+def _is_below(body: Rows) -> bool:
+    """Whether the last row is a remark below the table, or the mean of a column.
+
+    Whatever the language, a word begins it, below an empty row.
+    """
+    line, row = body[-1]
+    is_apart = len(body) > 1 and line - body[-2][0] > 1
+    is_word = bool(row[0]) and not _has_number(row[:1])
+    return not _has_number(row) or is_of_all_rows(row[0]) or (is_apart and is_word)
 
 
 def _has_number(row: list[str]) -> bool:

@@ -902,3 +902,11 @@ def test_equal_places_are_no_copies_where_a_path_turns_or_digits_are_few(tmp_pat
         path.write_text(f"t (s),y (m)\n{rows}\n")
         assert np.isfinite(read_table(path).position).all()
     assert np.isfinite(_falling({11: 10}, 2, tmp_path).position).all()
+
+
+@pytest.mark.parametrize("word", ["Średnia", "keskiarvo", "n.b. lost"])
+def test_what_a_word_begins_below_an_empty_row_is_no_row(word: str, tmp_path: Path):
+    path = tmp_path / "a.csv"
+    rows = [f"{n / 20:.2f};{0.3 * n**2 / 400:.4f}" for n in range(20)]
+    path.write_text("\n".join(["t (s);y (m)", *rows, "", f"{word};0.2417"]) + "\n")
+    assert read_table(path).position.shape[-1] == 20
