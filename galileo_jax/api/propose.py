@@ -91,6 +91,8 @@ def propose(
             progress.report("looking for what moves", DETECTED * next(done) / info.frame_count)
 
         try:
+            if info.turns_away:  # what is drawn from such a film moves at its edges
+                raise CameraMovesError
             every = find_movers(lambda: decode.frames(path), SPAN_PX, advance=advance)
         except CameraMovesError as error:
             raise InputError(f"{path}: {error}; mark the objects by hand") from None

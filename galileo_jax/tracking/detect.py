@@ -64,6 +64,9 @@ class Mover:
 class CameraMovesError(InputError):
     """Nearly all features of a picture move alike."""
 
+    def __init__(self) -> None:
+        super().__init__("the whole picture moves alike, as it does where the camera moves")
+
 
 def find_movers(
     open_frames: OpenFrames,
@@ -99,7 +102,7 @@ def find_movers(
     settled[-2:] = False
     onset = np.where(settled.any(axis=0), settled.argmax(axis=0), -1)
     if _whole_picture_moves(path, onset, size_px):
-        raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
+        raise CameraMovesError
     groups = _groups(path, onset, span_px)
     looks_on = may_fly or len(groups) < max(wanted, 1)
     some = some_frames(open_frames, len(path)) if looks_on or outlined else {}

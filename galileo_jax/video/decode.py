@@ -44,6 +44,8 @@ class VideoInfo:
     container_fps: float  # the film's own
     times_s: tuple[float, ...]  # when each picture that is looked at was taken, from the first on
     warnings: tuple[str, ...] = ()  # doubts, one line each
+    # whether the camera turns away from what it saw at first, so far that pictures are left out
+    turns_away: bool = False
 
     @property
     def frame_count(self) -> int:
@@ -93,7 +95,8 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
                 f"{fps:g} is used"
             )
     times_s = clock.times_s[scan.used]
-    return VideoInfo(scan.size_px, fps, rate, tuple((times_s - times_s[0]).tolist()), (*warnings,))
+    seconds = tuple((times_s - times_s[0]).tolist())
+    return VideoInfo(scan.size_px, fps, rate, seconds, (*warnings,), bool(scan.camera_lost))
 
 
 def announced(path: Path) -> tuple[int, float]:
