@@ -23,7 +23,6 @@ MOST_OFF_PERCENT = 5.0
 OF_ROLLING = {
     "a ball": (2 / 5, "shape: sphere"),
     "a cylinder": (1 / 2, "shape: cylinder, rolls: true"),
-    "a hollow ball": (2 / 3, "shape: sphere, rolls: 0.667"),
 }
 """J / (m r^2), and how a yaml declares such a body."""
 

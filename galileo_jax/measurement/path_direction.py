@@ -18,14 +18,15 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import line_observation, sign_along
 from galileo_jax.measurement.infer_ramp import LEVEL_SD_DEG, MIN_POINTS, falls_deg
-from galileo_jax.numerics.least_squares import circle, line_through
-from galileo_jax.observation.observation import Observation
+from galileo_jax.numerics.least_squares import circle, line_through, polynomial
+from galileo_jax.observation.observation import Observation, PointPath
 
 CLEAR = 4.0
 TURNED_DEG = 6.0
 NEARER = 3.0  # by so many times an axis of a table must be nearer to the path than the declared way
 STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
+EVENLY = 0.8  # of its first acceleration: what a spring pulls back loses all of it in a quarter
 EVEN = 0.2  # of its mean, by which the rate of a turn scatters that is even
 
 
@@ -96,6 +97,21 @@ def rises_forward(clip: Clip, observation: Observation) -> bool:
     return rises >= MIN_RAMP_ANGLE_DEG and (declared is None or abs(rises - declared) < TURNED_DEG)
 
 
+def _never_slower(clip: Clip, path: PointPath) -> str | None:
+    """One line where what should swing on a spring speeds up evenly to its end; else None."""
+    if len(path) < MIN_POINTS or path.farthest < len(path) - 1:
+        return None
+    way = np.linalg.norm(path.gone_m, axis=0)
+    since = path.times_s - path.times_s[0]
+    cubic, square, *_ = polynomial(since, way, 3).solution
+    if not square > 0 or 2 * square + 6 * cubic * since[-1] < EVENLY * 2 * square:
+        return None
+    return (
+        f"{clip.path}: {clip.objects[0].name} speeds up all the way and does not turn back, as "
+        "nothing does that swings on a spring (perhaps scenario: incline, or fall)"
+    )
+
+
 def _goes_round(times_s: np.ndarray, place: np.ndarray) -> bool:
     """Whether a path `[2, frame]` is a whole circle that is passed through evenly."""
     round_it = circle(*place)
@@ -151,6 +167,8 @@ def way_text(clip: Clip, way: OtherWay) -> str:
 def path_doubt(clip: Clip, observation: Observation) -> str | None:
     """One line where an object goes straight on where its scenario does not; else None."""
     path, name = observation.path(), observation.names[0]
+    if clip.scenario == "spring":
+        return _never_slower(clip, path)
     if clip.scenario not in ("pendulum", "fall", "ramp") or not len(path):
         return None
     place = path.place_m[:2]

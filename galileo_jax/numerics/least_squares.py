@@ -28,10 +28,11 @@ class LinearFit:
 
     @property
     def sds(self) -> np.ndarray:
-        """Of the solution `[term, ...]`, by the size of what is left."""
+        """Of the solution `[term, ...]`, by the size of what is left; inf of what is not told."""
         rows, terms = self.design.shape
         variance = np.sum(self.left**2, axis=0) / (rows - terms)
-        return np.sqrt(np.multiply.outer(np.diagonal(self.inverse), variance))
+        own = np.diagonal(self.inverse)  # by rounding below 0 where nothing tells a term
+        return np.sqrt(np.multiply.outer(np.where(own > 0, own, np.inf), variance))
 
 
 def least_squares(design: Float[np.ndarray, "row term"], values: np.ndarray) -> LinearFit:

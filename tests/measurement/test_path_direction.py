@@ -229,3 +229,18 @@ def test_a_slope_all_the_way_is_no_ramp_with_a_table(tmp_path):
     (said,) = (line for line in measure(load_clip(path)).warnings if "table is level" in line)
     assert "goes straight down by 20.0 degrees" in said
     assert "perhaps scenario: incline" in said
+
+
+@pytest.mark.parametrize("share, is_said", [(0.24, False), (0.6, False), (None, True)])
+def test_what_speeds_up_all_the_way_hangs_on_no_spring(share, is_said, tmp_path):
+    """A quarter of a swing from its turn, more than half of one, and a fall."""
+    t = np.arange(40) / 40
+    y = -0.1 * t**2 if share is None else 0.1 * np.cos(2 * np.pi * share * t / t[-1])
+    y = y + 1e-4 * np.random.default_rng(1).standard_normal(40)
+    rows = "\n".join(f"{a:.4f},{b:.6f}" for a, b in zip(t, y, strict=True))
+    (tmp_path / "a.csv").write_text(f"t (s),y (m)\n{rows}\n")
+    (tmp_path / "a.yaml").write_text(
+        "track: a.csv\nscenario: spring\nobjects: [{name: object1, shape: box}]\n"
+    )
+    said = measure(load_clip(tmp_path / "a.yaml")).impossible
+    assert (said is not None and "speeds up all the way" in said) == is_said
