@@ -212,6 +212,15 @@ def test_on_the_table_a_constant_force_is_level(levelness):
     assert np.diff(moving) == pytest.approx(-0.2 / M1 / 240, abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.6, 1.0])
+def test_a_wind_moves_the_others_too(share):
+    """As soon as it pulls more than friction holds."""
+    rough = replace(LONG_TABLE, friction=(0.1, 0.02))
+    motion = move(rough, {"constant_force": 0.2, "constant_force_on_others": share})
+    pulled = max(0.0, 0.2 * share / M2 - 0.02 * G)
+    assert motion.speed_m_s[1] == pytest.approx(pulled * motion.times_s, abs=EXACT)
+
+
 PATCH = {"friction_patch_start": 0.2, "friction_patch_length": 0.1, "friction_patch_edge": 0.005}
 BRAKE = {"magnetic_brake_start": 0.2, "magnetic_brake_length": 0.1, "magnetic_brake_edge": 0.005}
 

@@ -8,7 +8,6 @@ from galileo_jax.clip.scenarios import Scenario, register
 
 # What no thrown body's path shows; `toss` has the same.
 WITHOUT = (
-    "constant_force",  # along the velocity: nothing pushes so
     "initial_push",  # start_velocity
     "release_delay",  # start_velocity: it flies when the clip begins
     "spring_tether",  # along the velocity
