@@ -6,7 +6,8 @@
 On the table both are the same. On the ramp F cos a of the level one acts along the path, and
 F sin a lifts the object off and lightens what rubs. `constant_force_levelness` is 0 for the one and
 1 for the other. Object 1 is pulled, and each other object by `constant_force_on_others` times as
-much: 0 of a thread, 1 of a wind. In the air it is level, in space along x and z.
+much: 0 of a thread, 1 of a wind. On what is thrown it is level in the picture, and has no place in
+space, where a lift is as steady.
 
 Source: Newton, Principia, law II (1687).
 Confused with: k1, entirely where there is one slope: k_1 -> k_1 - F / (m g cos a) moves alike.
@@ -39,8 +40,7 @@ class ConstantForce(Effect):
     def parameters(self, scene):
         pull = Parameter(self.name, "N", PRIOR, 0.0, "effect", 0.05)
         if scene.is_thrown:
-            across = Parameter(f"{self.name}_z", "N", PRIOR, 0.0, "effect", 0.05)
-            return (pull, across) if scene.num_axes > 2 else (pull,)
+            return (pull,) if scene.num_axes == 2 else ()
         # They mean nothing while the force is absent.
         asked = {LEVELNESS: scene.crosses_foot, ON_OTHERS: len(scene.names) > 1}
         shares = [
@@ -70,12 +70,10 @@ class ConstantForce(Effect):
         return lambda state, k: not_negative(k * (1.0 - _on_ramp(state) * carried))
 
     def push(self, theta, scene):
-        if not scene.is_thrown:
+        if not scene.is_thrown or scene.num_axes > 2:
             return None
         pull = theta[self.name]
-        xp = pull.__array_namespace__()
-        level = [pull, 0.0 * pull, theta.get(f"{self.name}_z", 0.0 * pull)]
-        force = xp.stack(level[: scene.num_axes])
+        force = pull.__array_namespace__().stack([pull, 0.0 * pull])
         return lambda velocity_m_s, time_s: force
 
 
